@@ -1,0 +1,1 @@
+//! Motion: BVH, retargeting, the shipped walk.

@@ -1,0 +1,1 @@
+//! The dressed character as files: GLB and VRM.

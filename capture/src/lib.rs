@@ -1,0 +1,1 @@
+//! Frames, rigs, calibration, the source trait, takes on disk: recording, replay, import, inspection.

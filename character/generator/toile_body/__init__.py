@@ -1,0 +1,1 @@
+"""Makes Toile's body model from CC0 MakeHuman data; see ../README.md."""

@@ -1,0 +1,1 @@
+//! The body asset, skeleton, joint names, poses, skin weights and skinning.

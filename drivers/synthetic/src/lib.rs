@@ -1,0 +1,1 @@
+//! A thin capture device over the synthetic scene.

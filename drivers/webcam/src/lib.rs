@@ -1,0 +1,1 @@
+//! Colour from any webcam through nokhwa.

@@ -1,0 +1,1 @@
+//! Depth frames to a scan: filtering, tracking, loop closing, TSDF, surface extraction, clean-up.

@@ -1,0 +1,1 @@
+//! One small CPU rasteriser for reports, sensors and tests.

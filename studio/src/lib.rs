@@ -1,0 +1,1 @@
+//! The `toile` program: command line, pipeline, reports.

@@ -1,0 +1,3 @@
+//! The `toile` program.
+
+fn main() {}
