@@ -1,1 +1,28 @@
-//! The body asset, skeleton, joint names, poses, skin weights and skinning.
+//! The body asset, skeleton, joint names, poses, skin weights and skinning: what fitting, garments, animation and
+//! avatar all speak.
+//!
+//! - [`joint`]: the 52 VRM humanoid joints and their hierarchy;
+//! - [`Skeleton`]: where the joints of one person rest; [`Pose`]: how they are turned;
+//! - [`SkinWeights`] and [`skinning`]: linear blend skinning (Hu et al. 2017, eq. 3) and its inverse;
+//! - [`BodyModel`]: the statistical body (eq. 1 joints, eq. 2 shape) from the committed asset;
+//! - [`Motion`]: a pose over time.
+//!
+//! Subject frame: +Y up, +Z the front, +X the subject's left; metres, radians, seconds.
+
+pub mod body_model;
+pub mod error;
+pub mod joint;
+pub mod motion;
+pub mod pose;
+pub mod skeleton;
+pub mod skin;
+pub mod skinning;
+pub mod transfer;
+
+pub use body_model::{BodyModel, Region};
+pub use error::CharacterError;
+pub use joint::{JOINT_COUNT, Joint};
+pub use motion::Motion;
+pub use pose::Pose;
+pub use skeleton::Skeleton;
+pub use skin::{SkinWeights, SkinnedMesh};

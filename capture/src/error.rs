@@ -1,0 +1,52 @@
+//! What can go wrong while capturing, recording and replaying.
+
+use std::path::PathBuf;
+
+/// Errors of the capture crate.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureError {
+    /// A file could not be read or written.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file or folder is not what its format says.
+    #[error("{path}: {reason}")]
+    Format {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        reason: String,
+    },
+    /// A frame cannot be used.
+    #[error("frame {index}: {reason}")]
+    Frame {
+        /// Index of the frame in its source, from 0.
+        index: u64,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A device failed.
+    #[error("{device}: {reason}")]
+    Device {
+        /// Which device.
+        device: String,
+        /// What happened and what to do.
+        reason: String,
+    },
+}
+
+impl CaptureError {
+    /// Wraps an I/O error with the path it concerns.
+    pub fn io(path: &std::path::Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.to_path_buf(), source }
+    }
+
+    /// A format error at `path`.
+    pub fn format(path: &std::path::Path, reason: impl Into<String>) -> Self {
+        Self::Format { path: path.to_path_buf(), reason: reason.into() }
+    }
+}

@@ -1,0 +1,160 @@
+"""Draws adults whose stature, weight, chest, waist and hip girths follow ANSUR II jointly, and solves their sliders."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import sliders as sl
+from .measure import NAMES
+
+RACES = ("african", "asian", "caucasian")
+LOCAL_SPREAD = 0.12  # of every local slider; 0.22 gives exaggerated bodies
+WIDE_SCALE = 1.7  # how much wider than ANSUR II the second stratum's logarithms spread
+WIDE_BMI = (15.5, 52.0)
+# Solved sliders: name, spread of its prior, bounds. The first three are macro sliders, the others local ones.
+SOLVED = (
+    ("height", 0.30, 0.0, 1.0), ("weight", 0.22, 0.0, 1.0), ("muscle", 0.18, 0.0, 1.0),
+    ("torso/measure-bust-circ-decr-incr", 0.30, -1.0, 1.0), ("torso/measure-waist-circ-decr-incr", 0.30, -1.0, 1.0),
+    ("torso/measure-hips-circ-decr-incr", 0.30, -1.0, 1.0), ("torso/torso-scale-depth-decr-incr", 0.20, -1.0, 1.0),
+    ("torso/torso-scale-horiz-decr-incr", 0.20, -1.0, 1.0), ("hip/hip-scale-depth-decr-incr", 0.20, -1.0, 1.0),
+    ("hip/hip-scale-horiz-decr-incr", 0.20, -1.0, 1.0), ("stomach/stomach-tone-decr-incr", 0.25, -1.0, 1.0),
+    ("buttocks/buttocks-volume-decr-incr", 0.25, -1.0, 1.0),
+)
+TOLERANCE = np.array([0.002, 0.010, 0.008, 0.010, 0.008])  # of the logarithm of each measure
+CHUNK = 100
+
+
+@dataclass
+class People:
+    """Slider values and goals of a set of people (rows)."""
+
+    macro: dict
+    race: np.ndarray
+    local: np.ndarray
+    goal: np.ndarray  # logarithms of the five measures
+    wide: np.ndarray  # True in the wide stratum
+
+
+def draw(rng, count, wide_share, moments, local_names):
+    """Random people: sex alternates, ages 18 to 80, goals from ANSUR II's log-normal, wider in the wide stratum."""
+    male = np.arange(count) % 2 == 0
+    wide = rng.random(count) < wide_share
+    goal = np.array([draw_goal(rng, moments["male" if m else "female"], w) for m, w in zip(male, wide)])
+    spread = rng.uniform(0, 0.15, count)
+    clip = lambda x: np.clip(x, 0.0, 1.0)
+    macro = {
+        "gender": np.where(male, 1 - spread, spread),
+        "age": sl.age_from_years(rng.uniform(18, 80, count)),
+        "muscle": clip(np.where(male, 0.55, 0.45) + rng.normal(0, 0.12, count)),
+        "weight": clip(rng.normal(0.5, 0.1, count)),
+        "height": np.full(count, 0.5),
+        "proportions": clip(rng.normal(0.5, 0.15, count)),
+        "cup": clip(rng.normal(0.5, 0.17, count)),
+        "firm": clip(rng.normal(0.5, 0.17, count)),
+    }
+    race = rng.dirichlet([0.7] * 3, count)
+    local = np.clip(rng.normal(0, LOCAL_SPREAD, (count, len(local_names))), -0.5, 0.5)
+    for i, n in enumerate(local_names):
+        if n.startswith("head/head-") and not n.endswith(("decr-incr", "down-up", "in-out", "backward-forward")):
+            local[:, i] = np.abs(local[:, i])
+    return People(macro, race, local, goal, wide)
+
+
+def draw_goal(rng, m, wide):
+    """One person's logarithms of the five measures."""
+    mean, cov = np.array(m["log_mean"]), np.array(m["log_covariance"])
+    scale = WIDE_SCALE if wide else 1.0
+    root = np.linalg.cholesky(cov)
+    while True:
+        x = mean + scale * (root @ rng.normal(size=len(mean)))
+        bmi = np.exp(x[1] - 2 * x[0])
+        if not wide or WIDE_BMI[0] < bmi < WIDE_BMI[1]:
+            return x
+
+
+class Shapes:
+    """Bodies and joints from sliders, in chunks, in double precision."""
+
+    def __init__(self, base, sliders, selector):
+        n = 13380
+        self.sliders = sliders
+        self.body = base.targets[:, : 3 * n].toarray()
+        targets = base.targets.toarray().reshape(len(base.names), -1, 3)
+        self.joints = np.einsum("jv,tvc->tjc", selector, targets).reshape(len(base.names), -1)
+        self.body0, self.joints0 = base.vertices[:n].ravel(), (selector @ base.vertices).ravel()
+
+    def weights(self, people, rows):
+        """Target weights (rows x targets)."""
+        out = []
+        for i in rows:
+            macro = {k: v[i] for k, v in people.macro.items()}
+            out.append(self.sliders.weights(macro, dict(zip(RACES, people.race[i])), people.local[i]))
+        return np.array(out)
+
+    def bodies(self, people, rows):
+        """Vertices (rows x 13380 x 3) and joints (rows x 52 x 3) in the rest pose."""
+        w = self.weights(people, rows)
+        return (self.body0 + w @ self.body).reshape(len(rows), -1, 3), (self.joints0 + w @ self.joints).reshape(len(rows), -1, 3)
+
+
+def solve(shapes, tape, people, steps=5, log=print):
+    """Moves the solved sliders to the most likely values that meet each person's goal (Gauss-Newton, Broyden updates)."""
+    x0 = get_solved(shapes.sliders, people)
+    x = x0.copy()
+    prior = np.array([s[1] for s in SOLVED])
+    low, high = np.array([s[2] for s in SOLVED]), np.array([s[3] for s in SOLVED])
+    f = measure_all(shapes, tape, people)
+    jacobian = differences(shapes, tape, people, x, f)
+    for step in range(steps):
+        dx = np.zeros_like(x)
+        for i in range(len(x)):
+            a = jacobian[i] / TOLERANCE[:, None]
+            r = (people.goal[i] - f[i]) / TOLERANCE
+            h = a.T @ a + np.diag(prior**-2)
+            dx[i] = np.linalg.solve(h, a.T @ r + (x0[i] - x[i]) / prior**2)
+        new = np.clip(x + np.clip(dx, -0.35, 0.35), low, high)
+        put_solved(shapes.sliders, people, new)
+        g = measure_all(shapes, tape, people)
+        s = new - x
+        miss = (g - f) - np.einsum("imk,ik->im", jacobian, s)
+        jacobian += miss[:, :, None] * s[:, None, :] / ((s * s).sum(1) + 1e-9)[:, None, None]
+        x, f = new, g
+        rms = np.sqrt(((f - people.goal) ** 2).mean(0)) * 100
+        log(f"  step {step}: rms miss in % " + ", ".join(f"{n} {v:.2f}" for n, v in zip(NAMES, rms)))
+    return f
+
+
+def get_solved(sliders, people):
+    """Current values of the solved sliders (people x solved)."""
+    return np.stack([people.macro[n] if n in people.macro else people.local[:, sliders.local_names.index(n)] for n, *_ in SOLVED], 1)
+
+
+def put_solved(sliders, people, x):
+    """Writes values of the solved sliders."""
+    for k, (n, *_) in enumerate(SOLVED):
+        if n in people.macro:
+            people.macro[n] = x[:, k].copy()
+        else:
+            people.local[:, sliders.local_names.index(n)] = x[:, k]
+
+
+def measure_all(shapes, tape, people):
+    """Logarithms of the measures of everyone."""
+    out = []
+    for start in range(0, len(people.goal), CHUNK):
+        rows = range(start, min(start + CHUNK, len(people.goal)))
+        out += [np.log(tape.measure(v)) for v in shapes.bodies(people, rows)[0]]
+    return np.array(out)
+
+
+def differences(shapes, tape, people, x, f):
+    """Jacobian of the log measures by differences towards the middle of each slider's range."""
+    out = np.zeros((*f.shape, x.shape[1]))
+    for k, (_, _, low, high) in enumerate(SOLVED):
+        step = np.where(x[:, k] > 0.5 * (low + high), -0.1, 0.1)
+        moved = x.copy()
+        moved[:, k] += step
+        put_solved(shapes.sliders, people, moved)
+        out[:, :, k] = (measure_all(shapes, tape, people) - f) / step[:, None]
+    put_solved(shapes.sliders, people, x)
+    return out
