@@ -1,9 +1,20 @@
 //! The statistical body: mean, components, weights, joints (Hu et al. 2017, §5.1, eq. 1 and 2).
 
-use nalgebra::{Point3, Vector3};
-use serde::{Deserialize, Serialize};
+use std::sync::{Arc, OnceLock};
 
-use crate::{Skeleton, SkinWeights};
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use toile_geometry::Mesh;
+
+use crate::{
+    CharacterError, Pose, Skeleton, SkinWeights, SkinnedMesh, asset, dress_pose,
+    joint::{JOINT_COUNT, JOINTS},
+    mean_value::mean_value_weights,
+};
+
+/// The asset that ships with the program, made by `character/generator`.
+pub const DEFAULT_ASSET: &[u8] = include_bytes!("../assets/body.toile");
 
 /// The part of the body that a template vertex belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -20,6 +31,44 @@ pub enum Region {
     LeftFoot,
     RightFoot,
     Head,
+}
+
+impl Region {
+    /// All regions; the position is the asset's code.
+    pub const ALL: [Self; 10] = [
+        Self::Torso,
+        Self::LeftArm,
+        Self::RightArm,
+        Self::LeftLeg,
+        Self::RightLeg,
+        Self::LeftHand,
+        Self::RightHand,
+        Self::LeftFoot,
+        Self::RightFoot,
+        Self::Head,
+    ];
+
+    /// The region with this code.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(code)).copied()
+    }
+
+    /// True for hands, feet and head: thin or detailed, and left out where bodies are scored.
+    pub fn is_extremity(self) -> bool {
+        use Region::*;
+        matches!(self, LeftHand | RightHand | LeftFoot | RightFoot | Head)
+    }
+}
+
+/// What is known of the people that the model was made from.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PopulationInfo {
+    /// Mean β of the men.
+    pub beta_male: Vec<f32>,
+    /// Mean β of the women.
+    pub beta_female: Vec<f32>,
+    /// The generator's report: errors on held-out people, moments against ANSUR II.
+    pub report: serde_json::Value,
 }
 
 /// The statistical body model: closed template, shapes as mean + Σ βᵢ μᵢ (eq. 2), joints, skin weights.
@@ -46,4 +95,119 @@ pub struct BodyModel {
     pub inner: Vec<bool>,
     /// Landmark vertices by name, in name order.
     pub landmarks: Vec<(String, u32)>,
+    /// Root mean square displacement of the skin for β_i = 1, metres.
+    pub sigma: Vec<f32>,
+    /// Where the model comes from.
+    pub population: PopulationInfo,
+    /// Mean value coordinates of each joint of the mean body, computed when first asked for.
+    pub(crate) mean_value_weights: OnceLock<Arc<Vec<Vec<f64>>>>,
+}
+
+impl BodyModel {
+    /// The model that ships with the program.
+    ///
+    /// # Errors
+    /// [`CharacterError::Asset`] where the program was built with a broken asset.
+    pub fn load_default() -> Result<Self, CharacterError> {
+        Self::from_bytes(DEFAULT_ASSET)
+    }
+
+    /// Reads a body asset.
+    ///
+    /// # Errors
+    /// [`CharacterError::Asset`] says what is torn, foreign or out of range.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, CharacterError> {
+        asset::read(bytes)
+    }
+
+    /// Vertices of the body with coefficients `beta` in its rest pose (Hu et al. 2017, eq. 2), metres.
+    ///
+    /// `beta` may be shorter than the number of components (k = 15 as in the seed); what is longer is left out.
+    pub fn shape(&self, beta: &[f64]) -> Vec<Point3<f32>> {
+        const CHUNK: usize = 1024;
+        let mut out = self.mean.clone();
+        out.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, points)| {
+            for (column, &b) in self.components.iter().zip(beta) {
+                let b = b as f32;
+                for (p, d) in points.iter_mut().zip(&column[chunk * CHUNK..]) {
+                    *p += d * b;
+                }
+            }
+        });
+        out
+    }
+
+    /// Rest joints by the affine regressor in β: the default, the more exact one on body joints.
+    pub fn joints_affine(&self, beta: &[f64]) -> Skeleton {
+        let mut skeleton = self.mean_skeleton.clone();
+        for (column, &b) in self.joint_components.iter().zip(beta) {
+            for (joint, d) in skeleton.rest.iter_mut().zip(column) {
+                *joint += d * b;
+            }
+        }
+        skeleton
+    }
+
+    /// Rest joints of a body with this template's topology by mean value coordinates (Hu et al. 2017, eq. 1).
+    ///
+    /// # Errors
+    /// [`CharacterError::Mismatch`] where `vertices` are not as many as the template's.
+    pub fn joints_mvc(&self, vertices: &[Point3<f32>]) -> Result<Skeleton, CharacterError> {
+        if vertices.len() != self.mean.len() {
+            let (have, want) = (vertices.len(), self.mean.len());
+            return Err(CharacterError::Mismatch(format!("{have} vertices, but the template has {want}")));
+        }
+        let mut rest = [Point3::origin(); JOINT_COUNT];
+        for (joint, weights) in rest.iter_mut().zip(self.mean_value_weights()) {
+            joint.coords = weights.iter().zip(vertices).map(|(w, p)| p.coords.cast::<f64>() * *w).sum();
+        }
+        Ok(Skeleton { rest })
+    }
+
+    /// Mean value coordinates of each joint (joints × vertices), computed on the mean body when first asked for.
+    pub fn mean_value_weights(&self) -> &[Vec<f64>] {
+        self.mean_value_weights.get_or_init(|| {
+            let positions: Vec<Point3<f64>> = self.mean.iter().map(|p| p.cast()).collect();
+            let joint =
+                |j: &crate::Joint| mean_value_weights(&self.mean_skeleton.position(*j), &positions, &self.triangles);
+            Arc::new(JOINTS.par_iter().map(joint).collect())
+        })
+    }
+
+    /// The default skeleton of a body: [`Self::joints_affine`].
+    pub fn skeleton_at(&self, beta: &[f64]) -> Skeleton {
+        self.joints_affine(beta)
+    }
+
+    /// The body with coefficients `beta` as a skinned mesh at rest.
+    pub fn skinned(&self, beta: &[f64]) -> SkinnedMesh {
+        let mesh = Mesh::new(self.shape(beta), self.triangles.clone());
+        SkinnedMesh { mesh, skeleton: self.skeleton_at(beta), weights: self.weights.clone() }
+    }
+
+    /// Vertices of the body with coefficients `beta` in `pose` (eq. 2, then eq. 3).
+    pub fn posed(&self, beta: &[f64], pose: &Pose) -> Vec<Point3<f32>> {
+        let transforms = pose.skinning_transforms(&self.skeleton_at(beta));
+        crate::skinning::skin(&self.shape(beta), &self.weights, &transforms)
+    }
+
+    /// The pose that brings the body with coefficients `beta` from its A-pose to the T-pose.
+    pub fn t_pose(&self, beta: &[f64]) -> Pose {
+        dress_pose::t_pose(&self.skeleton_at(beta))
+    }
+
+    /// Vertex of the landmark called `name`.
+    pub fn landmark(&self, name: &str) -> Option<u32> {
+        self.landmarks.iter().find(|(n, _)| n == name).map(|(_, v)| *v)
+    }
+
+    /// Number of components.
+    pub fn component_count(&self) -> usize {
+        self.components.len()
+    }
+
+    /// Number of template vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.mean.len()
+    }
 }

@@ -9,9 +9,12 @@
 //!
 //! Subject frame: +Y up, +Z the front, +X the subject's left; metres, radians, seconds.
 
+pub mod asset;
 pub mod body_model;
+pub mod dress_pose;
 pub mod error;
 pub mod joint;
+pub mod mean_value;
 pub mod motion;
 pub mod pose;
 pub mod skeleton;
@@ -19,7 +22,7 @@ pub mod skin;
 pub mod skinning;
 pub mod transfer;
 
-pub use body_model::{BodyModel, Region};
+pub use body_model::{BodyModel, PopulationInfo, Region};
 pub use error::CharacterError;
 pub use joint::{JOINT_COUNT, Joint};
 pub use motion::Motion;
