@@ -25,9 +25,12 @@
 pub mod bvh;
 pub mod camera;
 pub mod error;
+pub mod intersection;
+pub mod max_flow;
 pub mod mesh;
 pub mod obj;
 pub mod ply;
+pub mod predicates;
 pub mod topology;
 pub mod triangle;
 
