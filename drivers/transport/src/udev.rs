@@ -1,0 +1,53 @@
+//! The udev rule that lets a logged-in user open the cameras.
+
+use std::path::{Path, PathBuf};
+
+use crate::{TransportError, known};
+
+/// Name of the rule file; below 73 so that `uaccess` takes effect.
+pub const RULE_FILE: &str = "60-toile.rules";
+
+/// Where rules of the local administrator belong.
+pub const RULES_FOLDER: &str = "/etc/udev/rules.d";
+
+/// Text of the rule for every known vendor: USB nodes and their video nodes.
+pub fn rules() -> String {
+    let mut text = String::from("# Depth cameras that Toile uses; gives the user at the seat access.\n");
+    for vendor in known::vendors() {
+        text.push_str(&format!(
+            "SUBSYSTEM==\"usb\", ATTRS{{idVendor}}==\"{vendor:04x}\", MODE=\"0660\", TAG+=\"uaccess\"\n\
+             SUBSYSTEM==\"video4linux\", ATTRS{{idVendor}}==\"{vendor:04x}\", MODE=\"0660\", TAG+=\"uaccess\"\n"
+        ));
+    }
+    text
+}
+
+/// Writes the rule into `folder` and returns the file.
+///
+/// # Errors
+/// [`TransportError::Rule`] where the folder cannot be written.
+pub fn install(folder: &Path) -> Result<PathBuf, TransportError> {
+    let path = folder.join(RULE_FILE);
+    std::fs::write(&path, rules()).map_err(|source| TransportError::Rule { path: path.clone(), source })?;
+    Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_vendor_has_a_usb_and_a_video_rule() {
+        let text = rules();
+        for vendor in known::vendors() {
+            let lines = text.lines().filter(|l| l.contains(&format!("\"{vendor:04x}\""))).count();
+            assert_eq!(lines, 2);
+        }
+    }
+
+    #[test]
+    fn a_folder_that_is_not_there_is_named() {
+        let error = install(Path::new("no/such/folder")).unwrap_err().to_string();
+        assert!(error.contains("no/such/folder") && error.contains("root"), "{error}");
+    }
+}

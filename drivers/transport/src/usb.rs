@@ -1,0 +1,118 @@
+//! Depth cameras on the bus.
+
+use rusb::UsbContext;
+use serde::Serialize;
+
+use crate::{TransportError, known, known::Known, udev};
+
+/// How fast a device is linked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LinkSpeed {
+    /// Not told by the system.
+    Unknown,
+    /// USB 1: 12 Mbit/s or less.
+    Full,
+    /// USB 2: 480 Mbit/s.
+    High,
+    /// USB 3: 5 Gbit/s or more.
+    Super,
+}
+
+/// A known camera that is plugged in.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct UsbCamera {
+    /// What people call it.
+    pub name: &'static str,
+    /// Its family.
+    pub family: known::Family,
+    /// Vendor and product id.
+    pub id: (u16, u16),
+    /// Bus and address.
+    pub address: (u8, u8),
+    /// Speed of its link.
+    pub speed: LinkSpeed,
+    /// What keeps it from working, each with what to do; empty where all is well.
+    pub problems: Vec<String>,
+}
+
+/// Lists the known cameras, ordered by bus and address.
+///
+/// # Errors
+/// [`TransportError::Usb`] where USB cannot be read at all.
+pub fn list() -> Result<Vec<UsbCamera>, TransportError> {
+    // `rusb::devices()` panics where there is no USB file system; a context of our own reports it.
+    let context = rusb::Context::new()?;
+    let mut cameras = Vec::new();
+    for device in context.devices()?.iter() {
+        let Ok(descriptor) = device.device_descriptor() else { continue };
+        let Some(known) = known::find(descriptor.vendor_id(), descriptor.product_id()) else { continue };
+        let speed = link_speed(device.speed());
+        let opened = device.open().map(|_| ());
+        cameras.push(UsbCamera {
+            name: known.name,
+            family: known.family,
+            id: (known.vendor, known.product),
+            address: (device.bus_number(), device.address()),
+            speed,
+            problems: problems(&known, speed, opened),
+        });
+    }
+    cameras.sort_by_key(|c| c.address);
+    Ok(cameras)
+}
+
+fn link_speed(speed: rusb::Speed) -> LinkSpeed {
+    match speed {
+        rusb::Speed::Low | rusb::Speed::Full => LinkSpeed::Full,
+        rusb::Speed::High => LinkSpeed::High,
+        rusb::Speed::Super | rusb::Speed::SuperPlus => LinkSpeed::Super,
+        _ => LinkSpeed::Unknown,
+    }
+}
+
+fn problems(known: &Known, speed: LinkSpeed, opened: Result<(), rusb::Error>) -> Vec<String> {
+    let mut found = Vec::new();
+    if known.needs_usb3 && speed != LinkSpeed::Super && speed != LinkSpeed::Unknown {
+        found.push("it is on a USB 2 link but streams only over USB 3: use a blue port and a USB 3 cable".to_string());
+    } else if known.family == known::Family::Realsense && speed == LinkSpeed::High {
+        found.push("it is on a USB 2 link, which halves its frame rate: use a blue port and a USB 3 cable".to_string());
+    }
+    match opened {
+        Err(rusb::Error::Access) => found.push(format!(
+            "no permission to open it: run `sudo toile devices --install-udev-rules` (writes {}/{}), then plug it in again",
+            udev::RULES_FOLDER,
+            udev::RULE_FILE
+        )),
+        Err(rusb::Error::Busy) => found.push("another program holds it: close that program".to_string()),
+        Err(rusb::Error::NoDevice) => found.push("it was unplugged just now: plug it in again".to_string()),
+        Err(other) => found.push(format!("it cannot be opened: {other}")),
+        Ok(()) => {}
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_link_and_a_missing_permission_are_told_with_a_remedy() {
+        let kinect2 = known::find(0x045e, 0x02c4).unwrap();
+        let both = problems(&kinect2, LinkSpeed::High, Err(rusb::Error::Access));
+        assert_eq!(both.len(), 2);
+        assert!(both[0].contains("USB 3"));
+        assert!(both[1].contains("--install-udev-rules"));
+        assert!(problems(&kinect2, LinkSpeed::Super, Ok(())).is_empty());
+        let kinect1 = known::find(0x045e, 0x02ae).unwrap();
+        assert!(problems(&kinect1, LinkSpeed::High, Ok(())).is_empty());
+    }
+
+    #[test]
+    fn listing_never_panics_with_or_without_usb() {
+        match list() {
+            Ok(cameras) => assert!(cameras.is_sorted_by_key(|c| c.address)),
+            Err(error) => assert!(error.to_string().contains("/dev/bus/usb")),
+        }
+    }
+}
