@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from . import asset, measure, model, mpfb, population, rig, sliders, surface
+from . import asset, balance, measure, model, mpfb, population, rig, sliders, surface
 
 HELD_OUT = 200
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -34,9 +34,10 @@ def main():
     bodies, joints = a_posed(shapes, people, template)
     log("samples in the A-pose")
     held = np.arange(len(bodies)) >= len(bodies) - HELD_OUT
-    result = model.build(bodies, joints, people.wide, held, template, base.triangles)
+    shares = balanced(moments, people, measured, held)
+    result = model.build(bodies, joints, shares, held, template, base.triangles)
     log("model built:", json.dumps(result["report"]))
-    report = dict(result["report"], population=population_report(moments, people, measured))
+    report = dict(result["report"], population=population_report(moments, people, measured, shares))
     log(json.dumps(report["population"], indent=1))
     size = write(a.out, base, template, result, report, vars(a))
     log(f"{a.out}: {size} bytes")
@@ -115,17 +116,31 @@ def a_posed(shapes, people, template):
     return np.array(bodies), np.array(joints)
 
 
-def population_report(moments, people, measured):
-    """Means, spreads and correlations of the ANSUR stratum against ANSUR II, per sex."""
+def balanced(moments, people, measured, held):
+    """Share of each person: ANSUR II's moments within each sex, half of the whole each, nothing for the others."""
+    male = people.macro["gender"] > 0.5
+    shares = np.zeros(len(measured))
+    for sex, mask in (("male", male), ("female", ~male)):
+        mask = mask & ~people.wide & ~held
+        shares[mask] = 0.5 * balance.balance(measured[mask], np.array(moments[sex]["log_mean"]), np.array(moments[sex]["log_covariance"]))
+    return shares
+
+
+def population_report(moments, people, measured, shares):
+    """Means, spreads and correlations of the balanced people against ANSUR II, per sex; effective number of people."""
     male = people.macro["gender"] > 0.5
     out = {}
     for sex, mask in (("male", male), ("female", ~male)):
-        x = np.exp(measured[mask & ~people.wide])
-        m = moments[sex]
-        sd = np.sqrt(np.diag(m["covariance"]))
-        have, want = np.corrcoef(x.T), np.array(m["covariance"]) / np.outer(sd, sd)
-        out[sex] = {"people": len(x), "mean": x.mean(0).round(4).tolist(), "ansur_mean": np.round(m["mean"], 4).tolist(),
-                    "sd": x.std(0, ddof=1).round(4).tolist(), "ansur_sd": sd.round(4).tolist(),
+        mask = mask & (shares > 0)
+        w, x = shares[mask] / shares[mask].sum(), np.exp(measured[mask])
+        mean = w @ x
+        cov = (x - mean).T @ ((x - mean) * w[:, None])
+        sd, m = np.sqrt(np.diag(cov)), moments[sex]
+        ansur_sd = np.sqrt(np.diag(m["covariance"]))
+        have, want = cov / np.outer(sd, sd), np.array(m["covariance"]) / np.outer(ansur_sd, ansur_sd)
+        out[sex] = {"people": int(mask.sum()), "effective_people": round(float(1 / (w * w).sum()), 1),
+                    "mean": mean.round(4).tolist(), "ansur_mean": np.round(m["mean"], 4).tolist(),
+                    "sd": sd.round(4).tolist(), "ansur_sd": ansur_sd.round(4).tolist(),
                     "correlation_max_difference": round(float(np.abs(have - want).max()), 3)}
     return out
 

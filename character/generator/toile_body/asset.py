@@ -19,3 +19,21 @@ def write(path, sections, meta):
     with open(path, "wb") as f:
         f.write(body + struct.pack("<I", zlib.crc32(body)))
     return len(body) + 4
+
+
+TYPES = {"triangles": "<u2", "mean": "<f4", "scales": "<f4", "components": "<i2", "joints": "<f4", "joint_components": "<f4",
+         "influences": "u1", "weights": "<u2", "regions": "u1", "inner": "u1"}
+
+
+def read(path):
+    """Metadata and sections (flat arrays by name) of an asset."""
+    with open(path, "rb") as f:
+        data = f.read()
+    if data[:8] != MAGIC or struct.unpack("<I", data[-4:])[0] != zlib.crc32(data[:-4]):
+        raise SystemExit(f"{path}: no body asset, or torn")
+    at = 16 + struct.unpack("<I", data[12:16])[0]
+    meta, out = json.loads(data[16:at]), {}
+    for s in meta["sections"]:
+        out[s["name"]] = np.frombuffer(data[at : at + s["bytes"]], TYPES[s["name"]])
+        at += s["bytes"]
+    return meta, out

@@ -8,13 +8,15 @@ COMPONENTS = 50
 INNER_WEIGHT = 0.05  # of vertices that no scanner sees, against skin of the same area
 
 
-def build(bodies, joints, wide, held, template, triangles):
-    """Mean and spreads come from the ANSUR stratum; the span of the components from everyone but the held-out people.
+def build(bodies, joints, shares, held, template, triangles):
+    """Mean and spreads come from the ANSUR stratum, each person by its share (balance.py; zero in the wide stratum); the span of the components from everyone but the held-out people.
 
     Vertices count by their area, so that the dense face and fingers do not use up the components.
     """
-    ansur, train = ~held & ~wide, ~held
-    mean, mean_joints = bodies[ansur].mean(0), joints[ansur].mean(0)
+    train = ~held
+    shares = np.where(held, 0.0, shares)
+    shares /= shares.sum()
+    mean, mean_joints = np.einsum("n,nvc->vc", shares, bodies), np.einsum("n,njc->jc", shares, joints)
     # The subject frame's origin: on the floor, between the feet of the mean.
     feet = [[n for n, _, _ in template["table"]].index(s + "Foot") for s in ("left", "right")]
     origin = np.array([0.0, 0.0, mean_joints[feet, 2].mean()])
@@ -22,7 +24,7 @@ def build(bodies, joints, wide, held, template, triangles):
     metric = np.sqrt(np.repeat(area / area.sum(), 3))
     x = (bodies - mean).reshape(len(bodies), -1)
     y = (joints - mean_joints).reshape(len(joints), -1)
-    basis, sigma = components(x[train] * metric, (x * metric)[ansur])
+    basis, sigma = components(x[train] * metric, (x * metric)[shares > 0], shares[shares > 0])
     columns = basis * sigma[:, None] / metric
     columns *= np.sign(columns[np.arange(COMPONENTS), np.abs(columns).argmax(1)])[:, None]
     scales = np.abs(columns).max(1) / 32767
@@ -37,17 +39,17 @@ def build(bodies, joints, wide, held, template, triangles):
     marks = surface.landmarks(mean, mean_joints, template["table"], template["region"], template["inner"], template["nipples"], template["navel"])
     return {"mean": mean - origin, "joints": mean_joints - origin, "scales": scales, "quantised": quantised, "sigma": sigma,
             "joint_components": regressor.reshape(COMPONENTS, -1, 3), "landmarks": marks, "report": report, "beta": beta,
-            "beta_male": beta[ansur & male].mean(0), "beta_female": beta[ansur & ~male].mean(0)}
+            "beta_male": 2 * (shares * male) @ beta, "beta_female": 2 * (shares * ~male) @ beta}
 
 
-def components(everyone, ansur):
+def components(everyone, ansur, shares):
     """Orthonormal rows spanning the strongest directions of `everyone`, turned to the principal axes of `ansur`."""
     gram = everyone @ everyone.T
     values, vectors = np.linalg.eigh(gram)
     top = np.argsort(-values)[:COMPONENTS]
     span = (vectors[:, top] / np.sqrt(values[top])).T @ everyone
     coefficients = ansur @ span.T
-    values, axes = np.linalg.eigh(coefficients.T @ coefficients / (len(ansur) - 1))
+    values, axes = np.linalg.eigh(coefficients.T @ (coefficients * shares[:, None]))
     turn = np.argsort(-values)
     return axes[:, turn].T @ span, np.sqrt(values[turn])
 

@@ -10,17 +10,19 @@ from .measure import NAMES
 RACES = ("african", "asian", "caucasian")
 LOCAL_SPREAD = 0.12  # of every local slider; 0.22 gives exaggerated bodies
 WIDE_SCALE = 1.7  # how much wider than ANSUR II the second stratum's logarithms spread
-WIDE_BMI = (15.5, 52.0)
-# Solved sliders: name, spread of its prior, bounds. The first three are macro sliders, the others local ones.
+WIDE_BMI = (15.5, 45.0)
+# Solved sliders: name, spread of its prior, bounds. The first four are macro sliders, the others local ones.
 SOLVED = (
-    ("height", 0.30, 0.0, 1.0), ("weight", 0.22, 0.0, 1.0), ("muscle", 0.18, 0.0, 1.0),
-    ("torso/measure-bust-circ-decr-incr", 0.30, -1.0, 1.0), ("torso/measure-waist-circ-decr-incr", 0.30, -1.0, 1.0),
-    ("torso/measure-hips-circ-decr-incr", 0.30, -1.0, 1.0), ("torso/torso-scale-depth-decr-incr", 0.20, -1.0, 1.0),
-    ("torso/torso-scale-horiz-decr-incr", 0.20, -1.0, 1.0), ("hip/hip-scale-depth-decr-incr", 0.20, -1.0, 1.0),
-    ("hip/hip-scale-horiz-decr-incr", 0.20, -1.0, 1.0), ("stomach/stomach-tone-decr-incr", 0.25, -1.0, 1.0),
-    ("buttocks/buttocks-volume-decr-incr", 0.25, -1.0, 1.0),
+    ("height", 0.30, 0.0, 1.0), ("weight", 0.35, 0.0, 1.15), ("soft", 0.40, 0.0, 1.0), ("strong", 0.40, 0.0, 1.0),
+    ("torso/measure-bust-circ-decr-incr", 0.30, -0.8, 0.8), ("torso/measure-waist-circ-decr-incr", 0.30, -0.8, 0.8),
+    ("torso/measure-hips-circ-decr-incr", 0.30, -0.8, 0.8), ("torso/torso-scale-depth-decr-incr", 0.20, -0.8, 0.8),
+    ("torso/torso-scale-horiz-decr-incr", 0.20, -0.8, 0.8), ("hip/hip-scale-depth-decr-incr", 0.20, -0.8, 0.8),
+    ("hip/hip-scale-horiz-decr-incr", 0.20, -0.8, 0.8), ("stomach/stomach-tone-decr-incr", 0.25, -0.8, 0.8),
+    ("buttocks/buttocks-volume-decr-incr", 0.25, -0.8, 0.8),
 )
-TOLERANCE = np.array([0.002, 0.010, 0.008, 0.010, 0.008])  # of the logarithm of each measure
+SOFT_STRONG = (2, 3)  # their places in SOLVED
+TOLERANCE = np.array([0.001, 0.006, 0.005, 0.006, 0.005])  # of the logarithm of each measure
+REFRESH = 1  # after this step the Jacobian is measured anew; else it is updated
 CHUNK = 100
 
 
@@ -45,8 +47,9 @@ def draw(rng, count, wide_share, moments, local_names):
     macro = {
         "gender": np.where(male, 1 - spread, spread),
         "age": sl.age_from_years(rng.uniform(18, 80, count)),
-        "muscle": clip(np.where(male, 0.55, 0.45) + rng.normal(0, 0.12, count)),
-        "weight": clip(rng.normal(0.5, 0.1, count)),
+        "soft": clip(rng.normal(0.35, 0.12, count)),
+        "strong": clip(np.where(male, 0.35, 0.25) + rng.normal(0, 0.12, count)),
+        "weight": clip(rng.normal(0.65, 0.1, count)),
         "height": np.full(count, 0.5),
         "proportions": clip(rng.normal(0.5, 0.15, count)),
         "cup": clip(rng.normal(0.5, 0.17, count)),
@@ -97,7 +100,7 @@ class Shapes:
         return (self.body0 + w @ self.body).reshape(len(rows), -1, 3), (self.joints0 + w @ self.joints).reshape(len(rows), -1, 3)
 
 
-def solve(shapes, tape, people, steps=5, log=print):
+def solve(shapes, tape, people, steps=6, log=print):
     """Moves the solved sliders to the most likely values that meet each person's goal (Gauss-Newton, Broyden updates)."""
     x0 = get_solved(shapes.sliders, people)
     x = x0.copy()
@@ -115,12 +118,16 @@ def solve(shapes, tape, people, steps=5, log=print):
         new = np.clip(x + np.clip(dx, -0.35, 0.35), low, high)
         put_solved(shapes.sliders, people, new)
         g = measure_all(shapes, tape, people)
+        rms = np.sqrt(((g - people.goal) ** 2).mean(0)) * 100
+        log(f"  step {step}: rms miss in % " + ", ".join(f"{n} {v:.2f}" for n, v in zip(NAMES, rms)))
         s = new - x
+        if step == REFRESH:
+            jacobian = differences(shapes, tape, people, new, g)
+            x, f = new, g
+            continue
         miss = (g - f) - np.einsum("imk,ik->im", jacobian, s)
         jacobian += miss[:, :, None] * s[:, None, :] / ((s * s).sum(1) + 1e-9)[:, None, None]
         x, f = new, g
-        rms = np.sqrt(((f - people.goal) ** 2).mean(0)) * 100
-        log(f"  step {step}: rms miss in % " + ", ".join(f"{n} {v:.2f}" for n, v in zip(NAMES, rms)))
     return f
 
 
@@ -130,7 +137,11 @@ def get_solved(sliders, people):
 
 
 def put_solved(sliders, people, x):
-    """Writes values of the solved sliders."""
+    """Writes values of the solved sliders; soft and strong share 1 at most."""
+    soft, strong = SOFT_STRONG
+    over = np.maximum(x[:, soft] + x[:, strong], 1.0)
+    x[:, soft] /= over
+    x[:, strong] /= over
     for k, (n, *_) in enumerate(SOLVED):
         if n in people.macro:
             people.macro[n] = x[:, k].copy()

@@ -5,7 +5,6 @@ import re
 import numpy as np
 
 # Pieces of a macro slider: value -> {name: share}. Ages: 0.1875 is a child, 0.5 a 25-year-old, 1.0 a 90-year-old.
-MACROS = ("gender", "age", "muscle", "weight", "height", "proportions", "cup", "firm")
 LOCAL_FOLDERS = (
     "arms", "breast", "buttocks", "cheek", "chin", "ears", "eyebrows", "eyes", "feet", "forehead", "hands", "head",
     "hip", "legs", "mouth", "neck", "nose", "pelvis", "stomach", "torso",
@@ -16,8 +15,8 @@ NOT_HUMAN = re.compile(r"pregnant|ear-shape-pointed|ear-wing|nubian")
 
 
 def split(value, low, middle, high):
-    """Shares of three names along a slider 0..1 with its middle at 0.5."""
-    v = float(np.clip(value, 0.0, 1.0))
+    """Shares of three names along a slider 0..1 with its middle at 0.5; beyond 1 it goes on straight."""
+    v = float(max(value, 0.0))
     if v < 0.5:
         return {low: 1 - 2 * v, middle: 2 * v}
     return {middle: 2 - 2 * v, high: 2 * v - 1}
@@ -56,9 +55,11 @@ class Sliders:
         return out
 
     def add_macro(self, out, m, race):
+        """MakeHuman's muscle slider meets only two of its three shapes at a time, and none of its mixtures has the girths of an
+        average soldier: `soft` and `strong` are the shares of the least and the most muscular shape, free of each other."""
         sex = {"male": m["gender"], "female": 1 - m["gender"]}
         age = age_shares(m["age"])
-        muscle = split(m["muscle"], "minmuscle", "averagemuscle", "maxmuscle")
+        muscle = {"minmuscle": m["soft"], "averagemuscle": 1 - m["soft"] - m["strong"], "maxmuscle": m["strong"]}
         weight = split(m["weight"], "minweight", "averageweight", "maxweight")
         height = split(m["height"], "minheight", None, "maxheight")
         proportions = split(m["proportions"], "uncommonproportions", None, "idealproportions")
@@ -76,7 +77,7 @@ class Sliders:
         stack = [(prefix, 1.0)]
         for f in factors:
             stack = [(p + ("" if p.endswith(("/", "-")) else "-") + n, s * w)
-                     for p, s in stack for n, w in f.items() if n is not None and w > 0]
+                     for p, s in stack for n, w in f.items() if n is not None and w != 0]
         for name, share in stack:
             i = self.index.get(name)
             if i is not None:

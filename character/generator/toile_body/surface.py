@@ -3,8 +3,8 @@
 import numpy as np
 
 REGIONS = ("torso", "leftArm", "rightArm", "leftLeg", "rightLeg", "leftHand", "rightHand", "leftFoot", "rightFoot", "head")
-PIXEL = 0.001  # metres, of the depth maps that find hidden vertices
-SLACK = 0.004  # metres that a vertex may lie behind the nearest surface and still count as seen
+PIXEL = 0.0015  # metres, of the depth maps that find hidden vertices
+SLACK = 0.0025  # metres that a vertex may lie behind the nearest surface and still count as seen
 
 
 def vertex_areas(v, triangles):
@@ -39,15 +39,17 @@ def regions(table, dense):
 
 
 def hidden(v, triangles, eyes_v, eyes_t, among):
-    """True for the vertices `among` (mask) that are seen from none of 96 directions, with eyeballs in their sockets."""
-    tri = v[triangles[among[triangles].all(1)]]
-    tri = np.concatenate([tri, eyes_v[eyes_t]])
-    n = 9
-    grid = np.array([(i, j, n - i - j) for i in range(n + 1) for j in range(n + 1 - i)]) / n
-    points = np.einsum("gk,tkc->tgc", grid, tri).reshape(-1, 3)
+    """True for the vertices `among` (mask) that are seen from no direction, with eyeballs in their sockets.
+
+    Depth maps of densely sampled surfaces stand in for rays. Views from below are left out: there the trunk is in the way.
+    """
     index = np.flatnonzero(among)
+    near = v[triangles][:, :, 1].min(1) > v[index, 1].min() - 0.05
+    points = sample(np.concatenate([v[triangles[near]], eyes_v[eyes_t]]), 0.5 * PIXEL)
     seen = np.zeros(len(index), bool)
     for d in fibonacci(96):
+        if d[1] < -0.5:
+            continue
         u = np.cross(d, [0.0, 1.0, 0.0] if abs(d[1]) < 0.9 else [1.0, 0.0, 0.0])
         u /= np.linalg.norm(u)
         frame = np.stack([u, np.cross(d, u)])
@@ -60,6 +62,17 @@ def hidden(v, triangles, eyes_v, eyes_t, among):
     out = np.zeros(len(v), bool)
     out[index[~seen]] = True
     return out
+
+
+def sample(tri, spacing):
+    """Points on triangles (count x 3 x 3), no farther apart than `spacing`."""
+    longest = np.linalg.norm(tri - np.roll(tri, 1, axis=1), axis=2).max(1)
+    steps = np.ceil(longest / spacing).astype(int)
+    out = []
+    for n in np.unique(steps):
+        grid = np.array([(i, j, n - i - j) for i in range(n + 1) for j in range(n + 1 - i)]) / n
+        out.append(np.einsum("gk,tkc->tgc", grid, tri[steps == n]).reshape(-1, 3))
+    return np.concatenate(out)
 
 
 def fibonacci(count):
