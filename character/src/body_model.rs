@@ -60,6 +60,17 @@ impl Region {
     }
 }
 
+/// How the joints of a body are found from its shape.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum JointRegressor {
+    /// Affine in β, learnt from the generator's people: nearer on body joints.
+    #[default]
+    Affine,
+    /// Mean value coordinates of the surface, as in Hu et al. 2017, eq. 1: nearer on fingers.
+    MeanValue,
+}
+
 /// What is known of the people that the model was made from.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PopulationInfo {
@@ -157,11 +168,15 @@ impl BodyModel {
             let (have, want) = (vertices.len(), self.mean.len());
             return Err(CharacterError::Mismatch(format!("{have} vertices, but the template has {want}")));
         }
+        Ok(self.mean_value_joints(vertices))
+    }
+
+    fn mean_value_joints(&self, vertices: &[Point3<f32>]) -> Skeleton {
         let mut rest = [Point3::origin(); JOINT_COUNT];
         for (joint, weights) in rest.iter_mut().zip(self.mean_value_weights()) {
             joint.coords = weights.iter().zip(vertices).map(|(w, p)| p.coords.cast::<f64>() * *w).sum();
         }
-        Ok(Skeleton { rest })
+        Skeleton { rest }
     }
 
     /// Mean value coordinates of each joint (joints × vertices), computed on the mean body when first asked for.
@@ -176,7 +191,15 @@ impl BodyModel {
 
     /// The default skeleton of a body: [`Self::joints_affine`].
     pub fn skeleton_at(&self, beta: &[f64]) -> Skeleton {
-        self.joints_affine(beta)
+        self.skeleton_by(beta, JointRegressor::Affine)
+    }
+
+    /// Rest joints of the body with coefficients `beta` by the given way.
+    pub fn skeleton_by(&self, beta: &[f64], regressor: JointRegressor) -> Skeleton {
+        match regressor {
+            JointRegressor::Affine => self.joints_affine(beta),
+            JointRegressor::MeanValue => self.mean_value_joints(&self.shape(beta)),
+        }
     }
 
     /// The body with coefficients `beta` as a skinned mesh at rest.

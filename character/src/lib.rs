@@ -22,7 +22,7 @@ pub mod skin;
 pub mod skinning;
 pub mod transfer;
 
-pub use body_model::{BodyModel, PopulationInfo, Region};
+pub use body_model::{BodyModel, JointRegressor, PopulationInfo, Region};
 pub use error::CharacterError;
 pub use joint::{JOINT_COUNT, Joint};
 pub use motion::Motion;

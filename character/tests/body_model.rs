@@ -6,7 +6,8 @@ use std::{path::PathBuf, time::Instant};
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use toile_character::{
-    BodyModel, JOINT_COUNT, Joint, Pose, Region, joint::JOINTS, mean_value::mean_value_weights, skinning,
+    BodyModel, JOINT_COUNT, Joint, JointRegressor, Pose, Region, joint::JOINTS, mean_value::mean_value_weights,
+    skinning,
 };
 use toile_geometry::{Mesh, topology::Edges};
 
@@ -111,6 +112,8 @@ fn the_two_joint_regressors_agree_on_the_mean_and_nearly_elsewhere() {
         JOINTS.iter().map(|&j| (a.position(j) - b.position(j)).norm()).sum::<f64>() / JOINT_COUNT as f64
     };
     assert!(gap(&m.mean_skeleton, &m.joints_mvc(&m.mean).unwrap()) < 1e-6);
+    assert_eq!(mvc, m.skeleton_by(&beta, JointRegressor::MeanValue));
+    assert_eq!(affine, m.skeleton_at(&beta));
     assert!(gap(&affine, &mvc) < 0.02, "{}", gap(&affine, &mvc));
 }
 
