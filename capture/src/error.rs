@@ -1,6 +1,6 @@
 //! What can go wrong while capturing, recording and replaying.
 
-use std::path::PathBuf;
+use std::{io::ErrorKind, path::PathBuf};
 
 /// Errors of the capture crate.
 #[derive(Debug, thiserror::Error)]
@@ -12,6 +12,14 @@ pub enum CaptureError {
         path: PathBuf,
         /// What the system said.
         source: std::io::Error,
+    },
+    /// There is no room left for a file.
+    #[error(
+        "{path}: the disk is full; free some space and run the command again (files that were complete before are untouched)"
+    )]
+    DiskFull {
+        /// The file that was being written.
+        path: PathBuf,
     },
     /// A file or folder is not what its format says.
     #[error("{path}: {reason}")]
@@ -40,9 +48,12 @@ pub enum CaptureError {
 }
 
 impl CaptureError {
-    /// Wraps an I/O error with the path it concerns.
+    /// Wraps an I/O error with the path it concerns; a full disk (or quota) becomes [`Self::DiskFull`].
     pub fn io(path: &std::path::Path, source: std::io::Error) -> Self {
-        Self::Io { path: path.to_path_buf(), source }
+        match source.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::DiskFull { path: path.to_path_buf() },
+            _ => Self::Io { path: path.to_path_buf(), source },
+        }
     }
 
     /// A format error at `path`.

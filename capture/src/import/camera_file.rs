@@ -1,0 +1,198 @@
+//! Calibration files: `camera.json` and its relatives.
+//!
+//! Read are: `width`, `height`, `fx`, `fy`, `cx`, `cy` (or Open3D's `intrinsic_matrix`, 9 numbers column by column);
+//! optional `distortion` (k1 k2 p1 p2 k3), `depth_scale` (metres a unit, or units a metre where it is 1 or more), `fps`;
+//! optional `color` (the same fields, of a colour camera that is not registered to depth) with `color_from_depth`
+//! (4×4, 16 numbers row by row, metres).
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::Matrix4;
+use serde_json::{Map, Value};
+use toile_geometry::{Rigid, camera::PinholeCamera};
+
+use super::{inventory::Listing, poses::rigid_from_matrix};
+use crate::{CaptureError, DeviceIdentity, Rig, Sensor};
+
+/// What a calibration file says.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CameraFile {
+    pub(super) depth: PinholeCamera,
+    /// Metres a depth unit.
+    pub(super) depth_scale: Option<f64>,
+    pub(super) fps: Option<f64>,
+    /// A colour camera that is not registered to depth.
+    pub(super) color: Option<(PinholeCamera, Rigid)>,
+}
+
+impl CameraFile {
+    /// An ideal camera without more.
+    pub(super) fn ideal(depth: PinholeCamera) -> Self {
+        Self { depth, depth_scale: None, fps: None, color: None }
+    }
+
+    /// A rig of this one sensor.
+    pub(super) fn rig(&self, format: &str, depth_scale: f64, fps: f64, has_color: bool) -> Rig {
+        let (color, color_from_depth) = match self.color {
+            Some((camera, pose)) => (camera, pose),
+            None => (self.depth, Rigid::identity()),
+        };
+        Rig {
+            sensors: vec![Sensor {
+                name: "camera".to_string(),
+                identity: DeviceIdentity { model: format!("import:{format}"), ..DeviceIdentity::default() },
+                depth: self.depth,
+                depth_scale: self.depth_scale.unwrap_or(depth_scale),
+                color: has_color.then_some(color),
+                color_from_depth,
+                rig_from_depth: Rigid::identity(),
+                fps,
+            }],
+        }
+    }
+}
+
+/// The calibration file of a folder: in it, or in the folder above.
+pub(super) fn find(folder: &Path) -> Result<Option<PathBuf>, CaptureError> {
+    let here = find_in(folder)?;
+    match (here, folder.parent()) {
+        (None, Some(above)) if !above.as_os_str().is_empty() => find_in(above),
+        (here, _) => Ok(here),
+    }
+}
+
+fn find_in(folder: &Path) -> Result<Option<PathBuf>, CaptureError> {
+    let listing = Listing::read(folder)?;
+    let named = |name: &&String| name.as_str() == "camera.json";
+    let similar = |name: &&String| name.ends_with(".json") && (name.contains("camera") || name.contains("intrinsic"));
+    let found = listing.files.iter().find(named).or_else(|| listing.files.iter().find(similar));
+    Ok(found.map(|name| folder.join(name)))
+}
+
+/// Reads a calibration file.
+pub(super) fn read(path: &Path) -> Result<CameraFile, CaptureError> {
+    let text = std::fs::read_to_string(path).map_err(|error| CaptureError::io(path, error))?;
+    parse(&text).map_err(|reason| CaptureError::format(path, reason))
+}
+
+fn parse(text: &str) -> Result<CameraFile, String> {
+    let value: Value = serde_json::from_str(text).map_err(|error| format!("is no readable JSON: {error}"))?;
+    let object = value.as_object().ok_or("must be a JSON object with width, height, fx, fy, cx, cy")?;
+    let depth = parse_camera(object, "")?;
+    let depth_scale = optional_positive(object, "depth_scale")?;
+    let color = match object.get("color") {
+        None | Some(Value::Null) => None,
+        Some(Value::Object(color)) => Some((parse_camera(color, "color.")?, parse_pose(object, "color_from_depth")?)),
+        Some(_) => return Err("field `color` must be an object with the colour camera's fields".to_string()),
+    };
+    Ok(CameraFile {
+        depth,
+        depth_scale: depth_scale.map(|scale| if scale >= 1.0 { 1.0 / scale } else { scale }),
+        fps: optional_positive(object, "fps")?,
+        color,
+    })
+}
+
+fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCamera, String> {
+    let width = pixels(object, prefix, "width")?;
+    let height = pixels(object, prefix, "height")?;
+    let [fx, fy, cx, cy] = match object.get("intrinsic_matrix") {
+        Some(matrix) => {
+            let m: [f64; 9] = numbers(matrix).ok_or_else(|| {
+                format!("field `{prefix}intrinsic_matrix` must be a list of 9 numbers, column by column")
+            })?;
+            [m[0], m[4], m[6], m[7]]
+        }
+        None => {
+            let number = |name: &str| required(object, prefix, name);
+            [number("fx")?, number("fy")?, number("cx")?, number("cy")?]
+        }
+    };
+    for (name, focal) in [("fx", fx), ("fy", fy)] {
+        if focal <= 0.0 {
+            return Err(format!("field `{prefix}{name}` is {focal}; a focal length in pixels is above 0"));
+        }
+    }
+    let distortion = match object.get("distortion") {
+        None | Some(Value::Null) => [0.0; 5],
+        Some(list) => numbers(list)
+            .ok_or_else(|| format!("field `{prefix}distortion` must be a list of 5 numbers: k1 k2 p1 p2 k3"))?,
+    };
+    Ok(PinholeCamera { distortion, ..PinholeCamera::ideal(width, height, fx, fy, cx, cy) })
+}
+
+fn pixels(object: &Map<String, Value>, prefix: &str, name: &str) -> Result<u32, String> {
+    let value = required(object, prefix, name)?;
+    if value.fract() == 0.0 && (1.0..=16384.0).contains(&value) {
+        return Ok(value as u32);
+    }
+    Err(format!("field `{prefix}{name}` is {value}; it must be a whole number of pixels from 1 to 16384"))
+}
+
+fn required(object: &Map<String, Value>, prefix: &str, name: &str) -> Result<f64, String> {
+    match object.get(name) {
+        None => Err(format!("field `{prefix}{name}` is missing")),
+        Some(value) => value
+            .as_f64()
+            .filter(|x| x.is_finite())
+            .ok_or_else(|| format!("field `{prefix}{name}` must be a number, but is {value}")),
+    }
+}
+
+fn optional_positive(object: &Map<String, Value>, name: &str) -> Result<Option<f64>, String> {
+    match object.get(name) {
+        None | Some(Value::Null) => Ok(None),
+        Some(_) => match required(object, "", name)? {
+            value if value > 0.0 => Ok(Some(value)),
+            value => Err(format!("field `{name}` is {value}; it must be above 0")),
+        },
+    }
+}
+
+fn parse_pose(object: &Map<String, Value>, name: &str) -> Result<Rigid, String> {
+    let wrong = || format!("field `{name}` must be 16 numbers: a 4x4 rigid transform row by row, metres");
+    let list: [f64; 16] = object.get(name).and_then(numbers).ok_or_else(wrong)?;
+    rigid_from_matrix(&Matrix4::from_row_slice(&list)).ok_or_else(wrong)
+}
+
+fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
+    let list: Vec<f64> = value.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
+    list.try_into().ok().filter(|list: &[f64; N]| list.iter().all(|x| x.is_finite()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str =
+        r#"{"width": 512, "height": 424, "fx": 365.0, "fy": 366, "cx": 256, "cy": 212, "depth_scale": 0.001}"#;
+
+    #[test]
+    fn wrong_fields_are_named() {
+        let cases = [
+            (GOOD.replace("\"fx\"", "\"focal\""), "`fx` is missing"),
+            (GOOD.replace("365.0", "\"wide\""), "`fx` must be a number"),
+            (GOOD.replace("365.0", "-3"), "`fx` is -3"),
+            (GOOD.replace("512", "0"), "`width` is 0"),
+            (GOOD.replace("424", "1e9"), "`height` is"),
+            (GOOD.replace("0.001", "0"), "`depth_scale` is 0"),
+            (GOOD.replace("}", r#", "distortion": [1, 2]}"#), "`distortion`"),
+            (GOOD.replace("}", r#", "color": {"width": 3}}"#), "`color.height` is missing"),
+            ("[]".to_string(), "JSON object"),
+            (GOOD[..40].to_string(), "no readable JSON"),
+        ];
+        for (text, expected) in cases {
+            let reason = parse(&text).unwrap_err();
+            assert!(reason.contains(expected), "{text}\nsaid: {reason}\nexpected: {expected}");
+        }
+    }
+
+    #[test]
+    fn both_ways_of_depth_scale_and_open3d_matrices() {
+        assert_eq!(parse(GOOD).unwrap().depth_scale, Some(0.001));
+        assert_eq!(parse(&GOOD.replace("0.001", "5000")).unwrap().depth_scale, Some(0.0002));
+        let open3d = r#"{"width": 640, "height": 480, "intrinsic_matrix": [525, 0, 0, 0, 524, 0, 319.5, 239.5, 1]}"#;
+        let camera = parse(open3d).unwrap().depth;
+        assert_eq!(camera, PinholeCamera::ideal(640, 480, 525.0, 524.0, 319.5, 239.5));
+    }
+}

@@ -1,0 +1,202 @@
+//! A folder's frames, listed by name and read one by one.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use super::images;
+use crate::{CaptureError, Frame, Rig, Source};
+
+/// Nominal rate where a folder does not say one (the common one of Kinect-class sensors).
+pub(super) const DEFAULT_FPS: f64 = 30.0;
+
+/// The names in a folder, sorted.
+#[derive(Debug, Default)]
+pub(super) struct Listing {
+    pub(super) files: Vec<String>,
+    pub(super) folders: Vec<String>,
+}
+
+impl Listing {
+    pub(super) fn read(path: &Path) -> Result<Self, CaptureError> {
+        let mut listing = Self::default();
+        for entry in std::fs::read_dir(path).map_err(|error| CaptureError::io(path, error))? {
+            let entry = entry.map_err(|error| CaptureError::io(path, error))?;
+            let Ok(name) = entry.file_name().into_string() else { continue };
+            let list = if entry.path().is_dir() { &mut listing.folders } else { &mut listing.files };
+            list.push(name);
+        }
+        listing.files.sort();
+        listing.folders.sort();
+        Ok(listing)
+    }
+
+    /// The files that `number` knows, by their number.
+    pub(super) fn numbered(
+        &self,
+        folder: &Path,
+        number: impl Fn(&str) -> Option<u64>,
+    ) -> Result<BTreeMap<u64, PathBuf>, CaptureError> {
+        let mut files = BTreeMap::new();
+        for name in &self.files {
+            let Some(number) = number(name) else { continue };
+            if let Some(other) = files.insert(number, folder.join(name)) {
+                let reason = format!("has the same number as {}", other.display());
+                return Err(CaptureError::format(&folder.join(name), reason));
+            }
+        }
+        Ok(files)
+    }
+}
+
+/// The last run of digits in a file's stem: its frame number.
+pub(super) fn last_number(name: &str) -> Option<u64> {
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let digits = |c: char| c.is_ascii_digit();
+    let end = stem.rfind(digits)? + 1;
+    let start = stem[..end].rfind(|c| !digits(c)).map_or(0, |at| at + 1);
+    stem[start..end].parse().ok()
+}
+
+/// Where one frame's images are.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Entry {
+    pub(super) number: u64,
+    pub(super) time_ns: i64,
+    pub(super) depth: Option<PathBuf>,
+    pub(super) color: Option<PathBuf>,
+    pub(super) mask: Option<PathBuf>,
+}
+
+/// Pairs depth with colour by number. `time_ns` gives the time of a number.
+pub(super) fn pair(
+    mut depth: BTreeMap<u64, PathBuf>,
+    mut color: BTreeMap<u64, PathBuf>,
+    mut mask: BTreeMap<u64, PathBuf>,
+    time_ns: impl Fn(usize, u64) -> i64,
+) -> Vec<Entry> {
+    let mut numbers: Vec<u64> = depth.keys().chain(color.keys()).copied().collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let entry = |(position, number): (usize, u64)| Entry {
+        number,
+        time_ns: time_ns(position, number),
+        depth: depth.remove(&number),
+        color: color.remove(&number),
+        mask: mask.remove(&number),
+    };
+    numbers.into_iter().enumerate().map(entry).collect()
+}
+
+/// Time of frame `number` at a steady rate from 0.
+pub(super) fn steady_time(number: u64, fps: f64) -> i64 {
+    (number as f64 * 1e9 / fps).round() as i64
+}
+
+/// A folder of images as a source; one sensor.
+#[derive(Debug)]
+pub(super) struct FolderSource {
+    rig: Rig,
+    entries: Vec<Entry>,
+    /// Numbers count by this much (7-Scenes excerpts keep every second frame).
+    stride: u64,
+    /// A depth value that means "nothing was measured", besides 0.
+    missing_value: Option<u16>,
+    next: usize,
+}
+
+impl FolderSource {
+    /// A source over `entries`, whose numbers must rise.
+    pub(super) fn new(
+        path: &Path,
+        rig: Rig,
+        entries: Vec<Entry>,
+        missing_value: Option<u16>,
+    ) -> Result<Self, CaptureError> {
+        if !entries.iter().any(|entry| entry.depth.is_some()) {
+            return Err(CaptureError::format(path, "there is no depth image in this folder"));
+        }
+        let stride = entries.windows(2).fold(0, |all, pair| gcd(all, pair[1].number.saturating_sub(pair[0].number)));
+        Ok(Self { rig, entries, stride: stride.max(1), missing_value, next: 0 })
+    }
+
+    pub(super) fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    fn load(&self, index: usize) -> Result<Frame, CaptureError> {
+        let entry = &self.entries[index];
+        let sensor = &self.rig.sensors[0];
+        let depth = match &entry.depth {
+            Some(path) => {
+                let mut depth = images::read_depth(path, &sensor.depth)?;
+                if let Some(missing) = self.missing_value {
+                    depth.values.iter_mut().filter(|value| **value == missing).for_each(|value| *value = 0);
+                }
+                if let Some(mask) = &entry.mask {
+                    images::apply_mask(mask, &mut depth)?;
+                }
+                Some(Arc::new(depth))
+            }
+            None => None,
+        };
+        let color = match (&entry.color, &sensor.color) {
+            (Some(path), Some(camera)) => Some(images::read_color(path, camera)?),
+            _ => None,
+        };
+        Ok(Frame {
+            sensor: 0,
+            index: index as u64,
+            device_frame: entry.number,
+            lost_before: self.lost_before(index),
+            device_time_ns: entry.time_ns,
+            host_time_ns: entry.time_ns,
+            depth,
+            color,
+        })
+    }
+
+    fn lost_before(&self, index: usize) -> u32 {
+        let Some(before) = index.checked_sub(1) else { return 0 };
+        let step = self.entries[index].number.saturating_sub(self.entries[before].number) / self.stride;
+        u32::try_from(step.saturating_sub(1)).unwrap_or(u32::MAX)
+    }
+}
+
+impl Source for FolderSource {
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
+        if self.next >= self.entries.len() {
+            return Ok(None);
+        }
+        self.next += 1;
+        self.load(self.next - 1).map(Some)
+    }
+
+    fn frame_count(&self) -> Option<u64> {
+        Some(self.entries.len() as u64)
+    }
+}
+
+fn gcd(a: u64, b: u64) -> u64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_from_the_last_digits_of_the_stem() {
+        assert_eq!(last_number("000012.png"), Some(12));
+        assert_eq!(last_number("cam2_depth_0031.png"), Some(31));
+        assert_eq!(last_number("7x.png"), Some(7));
+        assert_eq!(last_number("depth.png"), None);
+        assert_eq!(last_number("depth.mp4"), None, "the extension's digits are no frame number");
+    }
+}

@@ -1,0 +1,129 @@
+//! Copying a source into a recording.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::{CaptureError, Recorder, Source};
+
+/// What an import copied, and what it could not.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct ImportReport {
+    /// Frames in the recording.
+    pub frames: u64,
+    /// Device numbers of frames that have colour but no depth.
+    pub without_depth: Vec<u64>,
+    /// Device numbers of frames that have depth but no colour, where the sensor has colour.
+    pub without_color: Vec<u64>,
+    /// Frames that the device's numbers say are missing between those that are there.
+    pub lost: u64,
+    /// Frames that could not be read, each with the reason; they are not in the recording.
+    pub unreadable: Vec<String>,
+    /// Size of the recording, bytes.
+    pub bytes: u64,
+}
+
+impl ImportReport {
+    /// True where nothing is missing.
+    pub fn is_complete(&self) -> bool {
+        self.without_depth.is_empty() && self.without_color.is_empty() && self.lost == 0 && self.unreadable.is_empty()
+    }
+
+    /// True where data that was in the source is not in the recording.
+    pub fn lost_data(&self) -> bool {
+        !self.unreadable.is_empty()
+    }
+}
+
+impl fmt::Display for ImportReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} frames", self.frames)?;
+        for (numbers, what) in [(&self.without_depth, "without depth"), (&self.without_color, "without colour")] {
+            if !numbers.is_empty() {
+                write!(f, "; {} {what}: {}", numbers.len(), number_list(numbers))?;
+            }
+        }
+        if self.lost > 0 {
+            write!(f, "; {} missing by the frame numbers", self.lost)?;
+        }
+        if let Some(first) = self.unreadable.first() {
+            write!(f, "; {} not readable, the first: {first}", self.unreadable.len())?;
+        }
+        Ok(())
+    }
+}
+
+/// Copies all frames of `source` into `recorder` and finishes it. Frames that cannot be read are left out and reported;
+/// the next frame then counts them as lost. `progress` is called with 0..1 where the source knows its length.
+///
+/// # Errors
+/// [`CaptureError`] where the recording cannot be written or not one frame can be read (then with the first reason).
+pub fn record(
+    source: &mut dyn Source,
+    mut recorder: Recorder,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<ImportReport, CaptureError> {
+    let total = source.frame_count().unwrap_or(0).max(1);
+    let mut report = ImportReport::default();
+    let mut first_error = None;
+    let mut skipped = 0;
+    for done in 0_u64.. {
+        match source.next_frame() {
+            Ok(None) => break,
+            Ok(Some(mut frame)) => {
+                report.lost += u64::from(frame.lost_before);
+                frame.lost_before = frame.lost_before.saturating_add(std::mem::take(&mut skipped));
+                recorder.write(&frame)?;
+                report.frames += 1;
+                let has_color_camera = recorder.rig().sensors[frame.sensor].color.is_some();
+                if frame.depth.is_none() {
+                    report.without_depth.push(frame.device_frame);
+                }
+                if frame.color.is_none() && has_color_camera {
+                    report.without_color.push(frame.device_frame);
+                }
+            }
+            Err(error @ CaptureError::Device { .. }) => return Err(error),
+            Err(error) => {
+                skipped += 1;
+                report.unreadable.push(error.to_string());
+                first_error.get_or_insert(error);
+            }
+        }
+        progress((done + 1).min(total) as f32 / total as f32);
+    }
+    match first_error {
+        Some(error) if report.frames == 0 => Err(error),
+        _ => {
+            report.bytes = recorder.finish()?.bytes;
+            Ok(report)
+        }
+    }
+}
+
+/// Numbers for people: ranges where they follow each other, the first few of many.
+pub(crate) fn number_list(numbers: &[u64]) -> String {
+    let mut ranges: Vec<(u64, u64)> = Vec::new();
+    for &number in numbers {
+        match ranges.last_mut() {
+            Some((_, last)) if last.checked_add(1) == Some(number) => *last = number,
+            _ => ranges.push((number, number)),
+        }
+    }
+    let text = |&(first, last): &(u64, u64)| if first == last { first.to_string() } else { format!("{first}-{last}") };
+    let shown: Vec<String> = ranges.iter().take(8).map(text).collect();
+    let more = if ranges.len() > shown.len() { ", ..." } else { "" };
+    format!("{}{more}", shown.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_listed_as_ranges() {
+        assert_eq!(number_list(&[3, 4, 5, 9]), "3-5, 9");
+        assert_eq!(number_list(&[u64::MAX]), u64::MAX.to_string());
+        assert!(number_list(&(0..40).map(|i| 2 * i).collect::<Vec<_>>()).ends_with(", ..."));
+    }
+}

@@ -1,0 +1,388 @@
+//! Recordings: frames of a rig as one MCAP file.
+//!
+//! What is inside (see `docs/recording.md`): a metadata record `toile.recording` with the rig as JSON; per sensor the
+//! channels `/NAME/depth/image`, `/NAME/color/image`, `/NAME/depth/calibration`, `/NAME/color/calibration`; chunks
+//! without compression (the payloads are compressed already) that each hold whole frames, with CRC and index. An MCAP
+//! message's log time is the host time, its publish time the device time, its sequence the device's frame number.
+
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io::BufWriter,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use mcap::{
+    records::MessageHeader,
+    write::{NoSeek, WriteOptions, Writer},
+};
+
+use crate::{
+    CaptureError, ColorImage, DepthImage, Frame, RgbImage, Rig,
+    atomic_write::{create_parent, sync_parent, with_suffix},
+    depth_codec,
+    message::{ImageMessage, Stamp, encode_calibration},
+    schema::Schema,
+};
+
+/// Name of the metadata record that makes an MCAP file ours.
+pub(crate) const METADATA: &str = "toile.recording";
+
+/// How depth stands in the file; lossless either way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DepthEncoding {
+    /// Packed by [`depth_codec`] in `toile.CompressedDepth` messages: small; other viewers do not show it.
+    #[default]
+    Packed,
+    /// `foxglove.RawImage` with encoding `16UC1`: what the field's viewers display; about three times larger.
+    Raw,
+}
+
+/// How to record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecorderOptions {
+    /// How depth stands in the file.
+    pub depth: DepthEncoding,
+    /// A chunk is closed and synced to the disk after the frame that brings it to this many bytes; a power cut loses at
+    /// most one chunk. Default 4 MiB, less than half a second of a 640×480 sensor.
+    pub chunk_bytes: usize,
+    /// Delete a `.part` file of an earlier, interrupted run (right for imports, which can be repeated). When false it is
+    /// moved to `.part.1`, `.part.2`, ...
+    pub replace_part: bool,
+}
+
+impl Default for RecorderOptions {
+    fn default() -> Self {
+        Self { depth: DepthEncoding::Packed, chunk_bytes: 4 << 20, replace_part: false }
+    }
+}
+
+/// What a finished recording holds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordingSummary {
+    /// The file.
+    pub path: PathBuf,
+    /// Frames in it.
+    pub frames: u64,
+    /// Its size.
+    pub bytes: u64,
+}
+
+/// Writes a recording. It grows as `FILE.part` and becomes `FILE` in [`Self::finish`]; dropped before, the `.part` stays
+/// and can be replayed up to its last whole chunk.
+pub struct Recorder {
+    path: PathBuf,
+    part: PathBuf,
+    rig: Rig,
+    options: RecorderOptions,
+    writer: Writer<NoSeek<BufWriter<File>>>,
+    file: File,
+    channels: BTreeMap<(usize, Stream), u16>,
+    frames: u64,
+    pending: usize,
+}
+
+/// A channel of one sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Stream {
+    Depth,
+    Color,
+    RawColor,
+    DepthCalibration,
+    ColorCalibration,
+}
+
+impl Recorder {
+    /// Starts a recording that will be `path`.
+    ///
+    /// # Errors
+    /// [`CaptureError`] where `path` exists already, the rig is unusable or the file cannot be written.
+    pub fn create(path: &Path, rig: &Rig, options: RecorderOptions) -> Result<Self, CaptureError> {
+        check_rig(path, rig)?;
+        if path.exists() {
+            return Err(CaptureError::format(path, "the recording exists already; recordings are never overwritten"));
+        }
+        create_parent(path)?;
+        let part = with_suffix(path, ".part");
+        if !options.replace_part && part.exists() {
+            let kept = (1_u32..).map(|n| with_suffix(&part, &format!(".{n}"))).find(|kept| !kept.exists());
+            let kept = kept.unwrap_or_else(|| with_suffix(&part, ".kept"));
+            fs::rename(&part, kept).map_err(|error| CaptureError::io(&part, error))?;
+        }
+        let file = File::create(&part).map_err(|error| CaptureError::io(&part, error))?;
+        let twin = file.try_clone().map_err(|error| CaptureError::io(&part, error))?;
+        let writer = start_writer(file, rig, options.depth).map_err(|error| mcap_error(&part, error))?;
+        let (path, rig, channels) = (path.to_path_buf(), rig.clone(), BTreeMap::new());
+        Ok(Self { path, part, rig, options, writer, file: twin, channels, frames: 0, pending: 0 })
+    }
+
+    /// The rig that is recorded.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// Frames written so far.
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// Appends a frame; `frame.index` is not kept (frames are numbered in the order they are written).
+    ///
+    /// # Errors
+    /// [`CaptureError::Frame`] where the frame does not fit the rig (nothing is written then); [`CaptureError::DiskFull`]
+    /// and [`CaptureError::Io`] where it cannot be written.
+    pub fn write(&mut self, frame: &Frame) -> Result<(), CaptureError> {
+        self.check(frame)?;
+        let depth = frame.depth.as_deref().map(|depth| self.encode_depth(depth)).transpose()?;
+        if self.frames == 0 {
+            self.write_calibrations(frame.device_time_ns, frame.host_time_ns)?;
+        }
+        if let (Some(image), Some((schema, format, data))) = (&frame.depth, &depth) {
+            let step = 2 * image.width;
+            let message = self.raw_or_compressed(frame, *schema, format, [image.width, image.height, step], data);
+            let bytes = message.encode(*schema, &self.camera_name(frame.sensor, Stream::Depth));
+            self.append(Stream::Depth, *schema, frame, &bytes)?;
+        }
+        if let Some(color) = &frame.color {
+            self.write_color(frame, color)?;
+        }
+        self.frames += 1;
+        if self.pending >= self.options.chunk_bytes { self.close_chunk() } else { Ok(()) }
+    }
+
+    /// Closes the file, syncs it and gives it its final name.
+    ///
+    /// # Errors
+    /// [`CaptureError`] where that fails; the `.part` stays.
+    pub fn finish(mut self) -> Result<RecordingSummary, CaptureError> {
+        self.writer.finish().map_err(|error| mcap_error(&self.part, error))?;
+        self.file.sync_all().map_err(|error| CaptureError::io(&self.part, error))?;
+        let bytes = self.file.metadata().map_err(|error| CaptureError::io(&self.part, error))?.len();
+        fs::rename(&self.part, &self.path).map_err(|error| CaptureError::io(&self.path, error))?;
+        sync_parent(&self.path)?;
+        Ok(RecordingSummary { path: self.path.clone(), frames: self.frames, bytes })
+    }
+
+    fn check(&self, frame: &Frame) -> Result<(), CaptureError> {
+        let wrong = |reason: String| Err(CaptureError::Frame { index: frame.index, reason });
+        let Some(sensor) = self.rig.sensors.get(frame.sensor) else {
+            return wrong(format!("sensor {} is not in the rig of {}", frame.sensor, self.rig.sensors.len()));
+        };
+        if frame.depth.is_none() && frame.color.is_none() {
+            return wrong("there is neither depth nor colour in it".to_string());
+        }
+        let (width, height) = (sensor.depth.width, sensor.depth.height);
+        match &frame.depth {
+            Some(depth) if (depth.width, depth.height) != (width, height) => wrong(format!(
+                "the depth has {} x {} pixels, the calibration of {} says {width} x {height}",
+                depth.width, depth.height, sensor.name
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn encode_depth(&self, depth: &DepthImage) -> Result<(Schema, &'static str, Vec<u8>), CaptureError> {
+        match self.options.depth {
+            DepthEncoding::Raw => {
+                let data = depth.values.iter().flat_map(|value| value.to_le_bytes()).collect();
+                Ok((Schema::RawImage, "16UC1", data))
+            }
+            DepthEncoding::Packed => {
+                let data = depth_codec::encode(depth)
+                    .map_err(|error| CaptureError::Frame { index: self.frames, reason: error.to_string() })?;
+                Ok((Schema::CompressedDepth, depth_codec::NAME, data))
+            }
+        }
+    }
+
+    fn write_color(&mut self, frame: &Frame, color: &ColorImage) -> Result<(), CaptureError> {
+        let name = self.camera_name(frame.sensor, Stream::Color);
+        match color {
+            ColorImage::Jpeg(data) | ColorImage::Png(data) => {
+                let format = if matches!(color, ColorImage::Jpeg(_)) { "jpeg" } else { "png" };
+                let schema = Schema::CompressedImage;
+                let bytes = self.raw_or_compressed(frame, schema, format, [0; 3], data).encode(schema, &name);
+                self.append(Stream::Color, schema, frame, &bytes)
+            }
+            ColorImage::Rgb(image) => {
+                let RgbImage { width, height, pixels } = image.as_ref();
+                let size = [*width, *height, 3 * width];
+                let message = self.raw_or_compressed(frame, Schema::RawImage, "rgb8", size, pixels.as_flattened());
+                let bytes = message.encode(Schema::RawImage, &name);
+                self.append(Stream::RawColor, Schema::RawImage, frame, &bytes)
+            }
+        }
+    }
+
+    fn raw_or_compressed<'a>(
+        &self,
+        frame: &Frame,
+        schema: Schema,
+        format: &'a str,
+        size: [u32; 3],
+        data: &'a [u8],
+    ) -> ImageMessage<'a> {
+        let stamp = Stamp {
+            frame_index: self.frames,
+            sensor: frame.sensor as u32,
+            device_frame: frame.device_frame,
+            lost_before: frame.lost_before,
+            device_time_ns: frame.device_time_ns,
+            host_time_ns: frame.host_time_ns,
+        };
+        let [width, height, step] = if schema == Schema::RawImage { size } else { [0; 3] };
+        ImageMessage { stamp, format, width, height, step, data }
+    }
+
+    fn write_calibrations(&mut self, device_time_ns: i64, host_time_ns: i64) -> Result<(), CaptureError> {
+        let cameras: Vec<_> = self.rig.sensors.iter().map(|sensor| (sensor.depth, sensor.color)).collect();
+        for (sensor, (depth, color)) in cameras.into_iter().enumerate() {
+            let frame = Frame {
+                sensor,
+                index: 0,
+                device_frame: 0,
+                lost_before: 0,
+                device_time_ns,
+                host_time_ns,
+                depth: None,
+                color: None,
+            };
+            let streams = [(Stream::DepthCalibration, Some(depth)), (Stream::ColorCalibration, color)];
+            for (stream, camera) in streams {
+                let Some(camera) = camera else { continue };
+                let bytes = encode_calibration(&camera, &self.camera_name(sensor, stream), device_time_ns);
+                self.append(stream, Schema::CameraCalibration, &frame, &bytes)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn camera_name(&self, sensor: usize, stream: Stream) -> String {
+        format!("{}/{}", self.rig.sensors[sensor].name, stream.role())
+    }
+
+    fn append(&mut self, stream: Stream, schema: Schema, frame: &Frame, data: &[u8]) -> Result<(), CaptureError> {
+        let channel_id = self.channel(frame.sensor, stream, schema)?;
+        let header = MessageHeader {
+            channel_id,
+            sequence: frame.device_frame as u32,
+            log_time: u64::try_from(frame.host_time_ns).unwrap_or(0),
+            publish_time: u64::try_from(frame.device_time_ns).unwrap_or(0),
+        };
+        self.pending += data.len();
+        self.writer.write_to_known_channel(&header, data).map_err(|error| mcap_error(&self.part, error))
+    }
+
+    fn channel(&mut self, sensor: usize, stream: Stream, schema: Schema) -> Result<u16, CaptureError> {
+        if let Some(&id) = self.channels.get(&(sensor, stream)) {
+            return Ok(id);
+        }
+        let topic = format!("/{}/{}", self.rig.sensors[sensor].name, stream.topic());
+        let about = BTreeMap::from([
+            ("toile.sensor".to_string(), sensor.to_string()),
+            ("toile.stream".to_string(), stream.role().to_string()),
+        ]);
+        let id = self
+            .writer
+            .add_schema(schema.name(), "protobuf", &schema.descriptor())
+            .and_then(|schema| self.writer.add_channel(schema, &topic, "protobuf", &about))
+            .map_err(|error| mcap_error(&self.part, error))?;
+        self.channels.insert((sensor, stream), id);
+        Ok(id)
+    }
+
+    fn close_chunk(&mut self) -> Result<(), CaptureError> {
+        self.pending = 0;
+        self.writer.flush().map_err(|error| mcap_error(&self.part, error))?;
+        self.file.sync_data().map_err(|error| CaptureError::io(&self.part, error))
+    }
+}
+
+impl Stream {
+    fn topic(self) -> &'static str {
+        match self {
+            Self::Depth => "depth/image",
+            Self::Color => "color/image",
+            Self::RawColor => "color/raw",
+            Self::DepthCalibration => "depth/calibration",
+            Self::ColorCalibration => "color/calibration",
+        }
+    }
+
+    fn role(self) -> &'static str {
+        match self {
+            Self::Depth | Self::DepthCalibration => "depth",
+            Self::Color | Self::RawColor | Self::ColorCalibration => "color",
+        }
+    }
+}
+
+/// Rewrites the recording `path_in` as `path_out` with depth as `16UC1` images, which the field's viewers display.
+///
+/// # Errors
+/// [`CaptureError`] where one cannot be read or the other cannot be written.
+pub fn export_standard(path_in: &Path, path_out: &Path) -> Result<RecordingSummary, CaptureError> {
+    let replay = crate::Replay::open(path_in)?;
+    let options = RecorderOptions { depth: DepthEncoding::Raw, replace_part: true, ..RecorderOptions::default() };
+    let mut recorder = Recorder::create(path_out, crate::Source::rig(&replay), options)?;
+    for index in 0..replay.len() {
+        recorder.write(&replay.frame(index)?)?;
+    }
+    recorder.finish()
+}
+
+fn check_rig(path: &Path, rig: &Rig) -> Result<(), CaptureError> {
+    if rig.sensors.is_empty() {
+        return Err(CaptureError::format(path, "a recording needs a rig with at least one sensor"));
+    }
+    for (index, sensor) in rig.sensors.iter().enumerate() {
+        let name = &sensor.name;
+        if !sensor.depth.is_valid() || sensor.color.is_some_and(|color| !color.is_valid()) {
+            return Err(CaptureError::format(path, format!("the calibration of sensor {name} is not usable")));
+        }
+        if !(sensor.depth_scale.is_finite() && sensor.depth_scale > 0.0) {
+            return Err(CaptureError::format(path, format!("the depth scale of sensor {name} is not above 0")));
+        }
+        if rig.sensors[..index].iter().any(|other| other.name == *name) {
+            return Err(CaptureError::format(path, format!("two sensors of the rig are called {name}")));
+        }
+    }
+    Ok(())
+}
+
+type McapWriter = Writer<NoSeek<BufWriter<File>>>;
+
+fn start_writer(file: File, rig: &Rig, depth: DepthEncoding) -> Result<McapWriter, mcap::McapError> {
+    let mut writer = WriteOptions::new()
+        .compression(None)
+        .chunk_size(None)
+        .disable_seeking(true)
+        .library(concat!("toile ", env!("CARGO_PKG_VERSION")))
+        .create(NoSeek::new(BufWriter::new(file)))?;
+    let rig = serde_json::to_string(rig).map_err(|error| mcap::McapError::Io(std::io::Error::other(error)))?;
+    let (depth, note) = match depth {
+        DepthEncoding::Raw => ("16UC1", "depth is foxglove.RawImage, 16UC1"),
+        DepthEncoding::Packed => {
+            (depth_codec::NAME, "depth is packed losslessly by toile; `toile export --mcap` converts it to 16UC1")
+        }
+    };
+    let entries = [("version", "1"), ("depth_encoding", depth), ("note", note), ("rig", &rig)];
+    let metadata = entries.map(|(key, value)| (key.to_string(), value.to_string())).into();
+    writer.write_metadata(&mcap::write::Metadata { name: METADATA.to_string(), metadata })?;
+    Ok(writer)
+}
+
+fn mcap_error(path: &Path, error: mcap::McapError) -> CaptureError {
+    match error {
+        mcap::McapError::Io(error) => CaptureError::io(path, error),
+        other => CaptureError::format(path, other.to_string()),
+    }
+}
+
+/// Pixels from `rgb8` bytes.
+pub(crate) fn rgb_from_bytes(width: u32, height: u32, data: &[u8]) -> Option<ColorImage> {
+    let (pixels, rest) = data.as_chunks::<3>();
+    let fits = rest.is_empty() && pixels.len() as u64 == u64::from(width) * u64::from(height);
+    fits.then(|| ColorImage::Rgb(Arc::new(RgbImage { width, height, pixels: pixels.to_vec() })))
+}

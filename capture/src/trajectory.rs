@@ -1,0 +1,149 @@
+//! Trajectories in TUM's text format: one line `t tx ty tz qx qy qz qw` a frame, `#` starts a comment.
+//!
+//! t is a device time in seconds (nine decimals here, so that nanoseconds survive), then metres and a unit quaternion.
+
+use std::{fmt::Write, path::Path};
+
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use toile_geometry::Rigid;
+
+use crate::{CaptureError, atomic_write};
+
+/// A pose at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedPose {
+    /// Device time, nanoseconds.
+    pub time_ns: i64,
+    /// The pose; in trajectories of Toile's `scan_from_camera`.
+    pub pose: Rigid,
+}
+
+/// Reads a trajectory file.
+///
+/// # Errors
+/// [`CaptureError::Io`] where the file cannot be read, [`CaptureError::Format`] with the line that is wrong.
+pub fn read(path: &Path) -> Result<Vec<TimedPose>, CaptureError> {
+    let text = std::fs::read_to_string(path).map_err(|error| CaptureError::io(path, error))?;
+    parse(&text).map_err(|reason| CaptureError::format(path, reason))
+}
+
+/// Writes a trajectory file, whole or not at all.
+///
+/// # Errors
+/// [`CaptureError`] where it cannot be written.
+pub fn write(path: &Path, poses: &[TimedPose]) -> Result<(), CaptureError> {
+    atomic_write(path, to_text(poses).as_bytes())
+}
+
+/// The lines of a trajectory file.
+pub fn to_text(poses: &[TimedPose]) -> String {
+    let mut text = String::new();
+    for TimedPose { time_ns, pose } in poses {
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9}",
+            format_seconds(*time_ns),
+            t.x,
+            t.y,
+            t.z,
+            q.x,
+            q.y,
+            q.z,
+            q.w
+        );
+    }
+    text
+}
+
+/// Reads the lines of a trajectory file.
+///
+/// # Errors
+/// A sentence that names the line.
+pub fn parse(text: &str) -> Result<Vec<TimedPose>, String> {
+    let mut poses = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or("").trim();
+        if !line.is_empty() {
+            let pose = parse_line(line).ok_or_else(|| {
+                format!("line {} is not `t tx ty tz qx qy qz qw` with a rotation of length 1", number + 1)
+            })?;
+            poses.push(pose);
+        }
+    }
+    Ok(poses)
+}
+
+fn parse_line(line: &str) -> Option<TimedPose> {
+    let mut words = line.split_whitespace();
+    let time_ns = parse_seconds(words.next()?)?;
+    let numbers = words.map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect::<Option<Vec<f64>>>()?;
+    let [tx, ty, tz, qx, qy, qz, qw] = numbers.try_into().ok()?;
+    let rotation = Quaternion::new(qw, qx, qy, qz);
+    if (rotation.norm() - 1.0).abs() > 0.01 {
+        return None;
+    }
+    let rotation = UnitQuaternion::from_quaternion(rotation);
+    Some(TimedPose { time_ns, pose: Rigid::from_parts(Translation3::new(tx, ty, tz), rotation) })
+}
+
+/// Nanoseconds from decimal seconds, exact to the nanosecond (a f64 would lose them for Unix times).
+pub(crate) fn parse_seconds(word: &str) -> Option<i64> {
+    let (sign, digits) = match word.strip_prefix('-') {
+        Some(rest) => (-1_i128, rest),
+        None => (1, word),
+    };
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
+    let all_digits = |text: &str| text.bytes().all(|b| b.is_ascii_digit());
+    if whole.is_empty() || whole.len() > 18 || !all_digits(whole) || !all_digits(fraction) {
+        let seconds: f64 = word.parse().ok().filter(|x: &f64| x.abs() < 9.0e9)?;
+        return Some((seconds * 1e9).round() as i64);
+    }
+    let nanoseconds = format!("{:0<9}", fraction.get(..9.min(fraction.len()))?);
+    let total = whole.parse::<i128>().ok()? * 1_000_000_000 + nanoseconds.parse::<i128>().ok()?;
+    i64::try_from(sign * total).ok()
+}
+
+fn format_seconds(time_ns: i64) -> String {
+    let sign = if time_ns < 0 { "-" } else { "" };
+    let magnitude = time_ns.unsigned_abs();
+    format!("{sign}{}.{:09}", magnitude / 1_000_000_000, magnitude % 1_000_000_000)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn round_trip_keeps_nanoseconds() {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -2.0, 0.3));
+        let times = [0, 1, -1_500_000_000, 1_305_031_102_160_407_123];
+        let poses: Vec<_> = times
+            .iter()
+            .map(|&time_ns| TimedPose { time_ns, pose: Rigid::from_parts(Translation3::new(0.5, -1.25, 2.0), turn) })
+            .collect();
+        let back = parse(&to_text(&poses)).unwrap();
+        assert_eq!(back.len(), poses.len());
+        for (a, b) in back.iter().zip(&poses) {
+            assert_eq!(a.time_ns, b.time_ns);
+            assert!((a.pose.inverse() * b.pose).to_homogeneous().relative_eq(
+                &nalgebra::Matrix4::identity(),
+                1e-8,
+                1e-8
+            ));
+        }
+    }
+
+    #[test]
+    fn wrong_lines_are_named() {
+        let text = "# comment\n1.5 0 0 0 0 0 0 1\n2.5 0 0 0 0 0 1\n";
+        assert!(parse(text).unwrap_err().contains("line 3"));
+        assert!(parse("1 0 0 0 0 0 0 0").is_err(), "a quaternion of length 0 was accepted");
+        assert!(parse("1 0 0 NaN 0 0 0 1").is_err(), "NaN was accepted");
+        assert!(parse("x 0 0 0 0 0 0 1").is_err(), "a time that is no number was accepted");
+        assert_eq!(parse("1e-3 0 0 0 0 0 0 1").unwrap()[0].time_ns, 1_000_000);
+        assert_eq!(parse("").unwrap(), []);
+    }
+}

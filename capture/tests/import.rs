@@ -1,0 +1,236 @@
+//! Import: good folders, real ones where they are here, and each kind of bad one.
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::{all_frames, image_folder, shared};
+use toile_capture::{
+    CaptureError, Recorder, RecorderOptions, Replay, Source,
+    import::{self, Format, ImportOptions, ImportReport},
+};
+
+fn import_to(folder: &Path, out: &Path) -> Result<ImportReport, CaptureError> {
+    let mut source = import::open(folder, None)?;
+    let recorder = Recorder::create(out, source.rig(), RecorderOptions::default())?;
+    import::record(source.as_mut(), recorder, &|_| ())
+}
+
+#[test]
+fn a_folder_becomes_a_recording_with_the_same_frames() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 5);
+    let out = temp.path().join("take.mcap");
+    let report = import_to(&folder, &out).unwrap();
+    assert!(report.is_complete() && report.frames == 5, "{report}");
+    let from_folder = all_frames(import::open(&folder, None).unwrap().as_mut()).unwrap();
+    let mut replay = Replay::open(&out).unwrap();
+    assert_eq!(all_frames(&mut replay).unwrap(), from_folder);
+    assert_eq!(from_folder[3].device_time_ns, 1_300_000_000);
+    assert_eq!(from_folder[3].depth.as_ref().unwrap().at(2, 1), 1003 + 24 + 2);
+    let camera = &replay.rig().sensors[0];
+    assert_eq!((camera.depth_scale, camera.fps, camera.depth.fx), (0.001, 10.0, 20.0));
+    let jpeg = fs::read(folder.join("color/000003.jpg")).unwrap();
+    assert_eq!(from_folder[3].color, Some(toile_capture::ColorImage::Jpeg(jpeg.into())), "byte for byte");
+}
+
+#[test]
+fn missing_frames_are_counted_and_the_rest_is_kept() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 8);
+    fs::remove_file(folder.join("depth/000002.png")).unwrap();
+    fs::remove_file(folder.join("color/000004.jpg")).unwrap();
+    for file in ["depth/000006.png", "color/000006.jpg"] {
+        fs::remove_file(folder.join(file)).unwrap();
+    }
+    let out = temp.path().join("take.mcap");
+    let report = import_to(&folder, &out).unwrap();
+    assert_eq!((report.frames, report.lost), (7, 1));
+    assert_eq!((&report.without_depth, &report.without_color), (&vec![2], &vec![4]));
+    let text = report.to_string();
+    assert!(text.contains("without depth: 2") && text.contains("without colour: 4"), "{text}");
+    let last = Replay::open(&out).unwrap().frame(6).unwrap();
+    assert_eq!((last.device_frame, last.lost_before, last.device_time_ns), (7, 1, 1_700_000_000));
+}
+
+#[test]
+fn an_unreadable_frame_is_left_out_and_named() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 4);
+    let whole = fs::read(folder.join("depth/000001.png")).unwrap();
+    fs::write(folder.join("depth/000001.png"), &whole[..whole.len() / 2]).unwrap();
+    let out = temp.path().join("take.mcap");
+    let report = import_to(&folder, &out).unwrap();
+    assert_eq!(report.frames, 3);
+    assert!(report.lost_data() && report.unreadable[0].contains("000001.png"), "{report}");
+    assert_eq!(Replay::open(&out).unwrap().frame(1).unwrap().lost_before, 1);
+}
+
+#[test]
+fn bad_folders_get_one_clear_sentence() {
+    type Damage = fn(&Path);
+    let cases: [(&str, Damage); 12] = [
+        ("camera.json: is missing", |f| fs::remove_file(f.join("camera.json")).unwrap()),
+        ("field `fx` is missing", |f| edit(f, "\"fx\"", "\"focal\"")),
+        ("field `width` must be a number", |f| edit(f, "24", "\"24\"")),
+        ("24 x 16 pixels, but the calibration is for 48 x 16", |f| edit(f, "24", "48")),
+        ("there is no depth image", |f| clear(&f.join("depth"))),
+        ("no known layout", |f| fs::remove_dir_all(f.join("depth")).unwrap()),
+        ("timestamps.txt: has 2 lines, but there are 3 frames", |f| {
+            fs::write(f.join("timestamps.txt"), "1\n2\n").unwrap();
+        }),
+        ("line 2 is no time", |f| fs::write(f.join("timestamps.txt"), "1\nx\n3\n").unwrap()),
+        ("line 3 is not later", |f| fs::write(f.join("timestamps.txt"), "1\n5\n5\n").unwrap()),
+        ("must be a 16-bit grey PNG", |f| {
+            for i in 0..3 {
+                image::GrayImage::new(24, 16).save(f.join(format!("depth/{i:06}.png"))).unwrap();
+            }
+        }),
+        ("has the same number as", |f| {
+            fs::copy(f.join("depth/000001.png"), f.join("depth/1.png")).unwrap();
+        }),
+        ("No such file", |f| fs::remove_dir_all(f).unwrap()),
+    ];
+    for (expected, damage) in cases {
+        let temp = tempfile::tempdir().unwrap();
+        let folder = image_folder(&temp.path().join("take"), 3);
+        damage(&folder);
+        let out = temp.path().join("out.mcap");
+        let error = import_to(&folder, &out).expect_err(expected).to_string();
+        assert!(error.contains(expected), "said: {error}\nexpected: {expected}");
+        assert!(!error.contains('\n') && !out.exists(), "{error}");
+    }
+}
+
+fn edit(folder: &Path, from: &str, to: &str) {
+    let path = folder.join("camera.json");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(path, text.replacen(from, to, 1)).unwrap();
+}
+
+fn clear(folder: &Path) {
+    fs::remove_dir_all(folder).unwrap();
+    fs::create_dir(folder).unwrap();
+}
+
+#[test]
+fn formats_print_and_parse() {
+    for format in Format::ALL {
+        assert_eq!(format.to_string().parse::<Format>(), Ok(format));
+    }
+    assert!("bag".parse::<Format>().unwrap_err().contains("seven-scenes"));
+}
+
+struct Real {
+    path: &'static str,
+    format: Format,
+    frames: u64,
+    size: (u32, u32),
+    color: bool,
+    poses: usize,
+}
+
+#[test]
+fn real_folders_are_guessed_and_read() {
+    let real = |path, format, frames, size, color, poses| Real { path, format, frames, size, color, poses };
+    let cases = [
+        real("subjects/alder/01-trousers", Format::ToileFolder, 100, (512, 424), true, 100),
+        real("real/rgbd/uva_cv2_person_turn", Format::Uva, 100, (640, 480), true, 100),
+        real("real/rgbd/sevenscenes_kitchen_a", Format::SevenScenes, 60, (640, 480), true, 60),
+        real("real/rgbd/open3d_rgbd5", Format::ToileFolder, 5, (640, 480), true, 5),
+        real("real/rgbd/open3d_rgbd5/tum", Format::Tum, 1, (640, 480), true, 0),
+        real("turntable/noisy", Format::ToileFolder, 300, (640, 480), false, 300),
+    ];
+    for case in cases {
+        let Some(path) = shared(case.path) else { continue };
+        assert_eq!(import::guess(&path).unwrap(), case.format, "{}", case.path);
+        let mut source = import::open(&path, None).unwrap();
+        assert_eq!(source.frame_count(), Some(case.frames), "{}", case.path);
+        let sensor = source.rig().sensors[0].clone();
+        assert_eq!(sensor.color.is_some(), case.color);
+        let frame = source.next_frame().unwrap().unwrap();
+        let depth = frame.depth.unwrap();
+        assert_eq!((depth.width, depth.height), case.size);
+        let mut metres: Vec<f64> =
+            depth.values.iter().filter(|&&v| v > 0).map(|&v| f64::from(v) * sensor.depth_scale).collect();
+        metres.sort_by(f64::total_cmp);
+        let median = metres[metres.len() / 2];
+        assert!((0.5..4.0).contains(&median), "{}: median depth {median} m", case.path);
+        assert!(metres[metres.len() - 1] < 20.0, "{}: 65535 is no depth", case.path);
+        if let Some(color) = frame.color {
+            assert_eq!(color.decode(0).unwrap().width, case.size.0);
+        }
+        let second = source.next_frame().unwrap();
+        assert!(second.is_none_or(|frame| frame.lost_before == 0), "{}: a stride is no loss", case.path);
+        let poses = import::reference_poses(&path).unwrap().unwrap_or_default();
+        assert_eq!(poses.len(), case.poses, "{}", case.path);
+    }
+}
+
+#[test]
+fn reference_poses_carry_the_frames_device_times() {
+    for name in ["subjects/birch/00-body", "real/rgbd/uva_cv2_person_turn", "turntable/clean"] {
+        let Some(path) = shared(name) else { continue };
+        let poses = import::reference_poses(&path).unwrap().unwrap();
+        let frames = all_frames(import::open(&path, None).unwrap().as_mut()).unwrap();
+        for (pose, frame) in poses.iter().zip(&frames) {
+            assert!((pose.time_ns - frame.device_time_ns).abs() < 1000, "{name}: frame {}", frame.index);
+        }
+    }
+}
+
+#[test]
+fn a_real_take_survives_recording_bit_by_bit() {
+    let Some(path) = shared("subjects/alder/00-body") else { return };
+    let temp = tempfile::tempdir().unwrap();
+    let out = temp.path().join("00-body.mcap");
+    let report = import_to(&path, &out).unwrap();
+    assert!(report.is_complete(), "{report}");
+    let mut replay = Replay::open(&out).unwrap();
+    let mut source = import::open(&path, None).unwrap();
+    while let Some(frame) = source.next_frame().unwrap() {
+        assert_eq!(replay.next_frame().unwrap(), Some(frame));
+    }
+}
+
+#[test]
+fn masks_of_uva_cut_the_background_only_when_asked() {
+    let Some(path) = shared("real/rgbd/uva_cv2_person_turn") else { return };
+    let count = |apply_mask| {
+        let mut source = import::open_with(&path, &ImportOptions { format: None, apply_mask }).unwrap();
+        let depth = source.next_frame().unwrap().unwrap().depth.unwrap();
+        depth.values.iter().filter(|&&v| v > 0).count()
+    };
+    let (all, person) = (count(false), count(true));
+    assert!(person * 10 > all && person < all, "{person} of {all}");
+}
+
+#[test]
+fn the_turntable_folder_itself_points_to_its_parts() {
+    let Some(path) = shared("turntable") else { return };
+    let error = import::open(&path, None).err().unwrap().to_string();
+    assert!(error.contains("clean, noisy"), "{error}");
+}
+
+#[test]
+fn tum_lists_pair_by_time() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path().join("tum");
+    fs::create_dir_all(folder.join("depth")).unwrap();
+    fs::create_dir_all(folder.join("rgb")).unwrap();
+    let depth = image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(640, 480, image::Luma([5000_u16]));
+    depth.save(folder.join("depth/a.png")).unwrap();
+    image::RgbImage::new(640, 480).save(folder.join("rgb/b.png")).unwrap();
+    fs::write(folder.join("depth.txt"), "# depth maps\n1305031102.160407 depth/a.png\n").unwrap();
+    fs::write(folder.join("rgb.txt"), "1305031102.175304 rgb/b.png\n1305031103.5 rgb/b.png\n").unwrap();
+    fs::write(folder.join("groundtruth.txt"), "1305031102.1 0 0 0 0 0 0 1\n").unwrap();
+    let mut source = import::open(&folder, None).unwrap();
+    assert_eq!(source.rig().sensors[0].depth_scale, 0.0002);
+    let frames = all_frames(source.as_mut()).unwrap();
+    assert_eq!(frames[0].device_time_ns, 1_305_031_102_160_407_000);
+    let has = |i: usize| (frames[i].depth.is_some(), frames[i].color.is_some());
+    assert_eq!((frames.len(), has(0), has(1)), (2, (true, true), (false, true)));
+    assert_eq!(import::reference_poses(&folder).unwrap().unwrap().len(), 1);
+    fs::write(folder.join("depth.txt"), "what is this\n").unwrap();
+    assert!(import::open(&folder, None).err().unwrap().to_string().contains("line 1"));
+}
