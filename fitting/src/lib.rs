@@ -1,1 +1,34 @@
 //! Shape and pose of the statistical body from a scan, weights onto scans, measurements, posing under clothes.
+//!
+//! - [`fit_body`]: shape and pose of one scan (Hu et al. 2017, eq. 4), conformation, stature and girths;
+//! - [`rig_scan`], [`rigged_scan`]: skin weights onto the scan itself;
+//! - [`measure()`]: stature and girths of a body at rest.
+//!
+//! A fit that should not be trusted is a result with a [`Verdict`]; having no answer is a [`FittingError`].
+
+mod articulated;
+mod body_fit;
+mod cloud;
+mod conform;
+mod correspond;
+mod equations;
+mod error;
+mod level;
+pub mod measure;
+mod prepare;
+mod prior;
+mod rig;
+mod settings;
+mod start;
+mod summary;
+mod thin;
+mod verdict;
+
+pub use body_fit::{BodyFit, fit_body};
+pub use error::FittingError;
+pub use measure::{Measurements, measure};
+pub use prepare::Mend;
+pub use rig::{rig_scan, rigged_scan};
+pub use settings::{ConformSettings, FitSettings, UnderSettings};
+pub use summary::{BodySummary, Theta};
+pub use verdict::{DistanceStats, FitReport, Verdict};

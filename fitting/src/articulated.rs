@@ -1,0 +1,314 @@
+//! A skinned surface with its derivatives by pose and shape (Hu et al. 2017, eq. 2 and 3).
+
+use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+use toile_character::{BodyModel, JOINT_COUNT, Joint, Pose, Skeleton, SkinWeights, SkinnedMesh, joint::JOINTS};
+
+use crate::thin::Thinned;
+
+/// The unknowns: joint angles θ and shape coefficients β.
+#[derive(Debug, Clone)]
+pub(crate) struct State {
+    pub pose: Pose,
+    pub beta: Vec<f64>,
+}
+
+/// Vertices that can be posed and shaped, with what their derivatives need.
+pub(crate) struct Articulated {
+    rest: Vec<Point3<f32>>,
+    rest_normals: Vec<Vector3<f32>>,
+    /// Area that a vertex stands for, square metres.
+    pub areas: Vec<f32>,
+    weights: SkinWeights,
+    /// Vertex-major shape components: `basis[vertex * components + component]`.
+    basis: Vec<Vector3<f32>>,
+    components: usize,
+    skeleton: Skeleton,
+    joint_basis: Vec<Vec<Vector3<f64>>>,
+}
+
+/// Vertices of one state.
+pub(crate) struct Posed {
+    pub points: Vec<Point3<f32>>,
+    /// Rest normals turned along; good to a few degrees, which is enough to tell sides apart.
+    pub normals: Vec<Vector3<f32>>,
+    /// Shaped rest vertices.
+    shaped: Vec<Point3<f64>>,
+    /// `posed_from_rest` of each joint.
+    transforms: Vec<Isometry3<f64>>,
+    /// World position and orientation of each joint.
+    pub frames: Vec<Isometry3<f64>>,
+    /// For each component and joint: how the joint's transform moves its part of the skin for β_b = 1.
+    joint_shifts: Vec<Vec<Vector3<f64>>>,
+}
+
+/// Which unknowns are free: translation (columns 0 to 2), rotations of `joints` (three columns each), then β.
+pub(crate) struct Columns {
+    pub joints: Vec<Joint>,
+    of_joint: [Option<usize>; JOINT_COUNT],
+    pub betas: usize,
+}
+
+impl Columns {
+    pub fn new(joints: Vec<Joint>, betas: usize) -> Self {
+        let mut of_joint = [None; JOINT_COUNT];
+        for (k, joint) in joints.iter().enumerate() {
+            of_joint[joint.index()] = Some(3 + 3 * k);
+        }
+        Self { joints, of_joint, betas }
+    }
+
+    /// Number of unknowns.
+    pub fn len(&self) -> usize {
+        self.first_beta() + self.betas
+    }
+
+    /// Column of β_0.
+    pub fn first_beta(&self) -> usize {
+        3 + 3 * self.joints.len()
+    }
+
+    /// First of the three columns of `joint`.
+    pub fn of(&self, joint: Joint) -> Option<usize> {
+        self.of_joint[joint.index()]
+    }
+}
+
+impl Articulated {
+    /// The vertices `picked` of the statistical body, with its first `components` components.
+    pub fn of_model(model: &BodyModel, picked: &Thinned, components: usize) -> Self {
+        let components = components.min(model.components.len());
+        let mesh = toile_geometry::Mesh::new(model.mean.clone(), model.triangles.clone());
+        let mut out = Self::of_mesh(&mesh, &model.weights, &model.mean_skeleton, picked);
+        out.components = components;
+        out.basis = picked
+            .vertices
+            .iter()
+            .flat_map(|&v| (0..components).map(move |b| (v as usize, b)))
+            .map(|(v, b)| model.components[b][v])
+            .collect();
+        out.joint_basis = model.joint_components[..components].to_vec();
+        out
+    }
+
+    /// The vertices `picked` of a skinned mesh; its shape is fixed.
+    pub fn of_skinned(skinned: &SkinnedMesh, picked: &Thinned) -> Self {
+        Self::of_mesh(&skinned.mesh, &skinned.weights, &skinned.skeleton, picked)
+    }
+
+    fn of_mesh(mesh: &toile_geometry::Mesh, weights: &SkinWeights, skeleton: &Skeleton, picked: &Thinned) -> Self {
+        let normals = mesh.vertex_normals();
+        let areas = picked.areas.clone();
+        let picked = &picked.vertices;
+        Self {
+            rest: picked.iter().map(|&v| mesh.positions[v as usize]).collect(),
+            rest_normals: picked.iter().map(|&v| normals[v as usize]).collect(),
+            areas,
+            weights: SkinWeights {
+                joints: picked.iter().map(|&v| weights.joints[v as usize]).collect(),
+                weights: picked.iter().map(|&v| weights.weights[v as usize]).collect(),
+            },
+            basis: Vec::new(),
+            components: 0,
+            skeleton: skeleton.clone(),
+            joint_basis: Vec::new(),
+        }
+    }
+
+    /// Number of vertices.
+    pub fn len(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Rest joints at `beta`.
+    pub fn skeleton_at(&self, beta: &[f64]) -> Skeleton {
+        let mut skeleton = self.skeleton.clone();
+        for (column, &b) in self.joint_basis.iter().zip(beta) {
+            for (joint, d) in skeleton.rest.iter_mut().zip(column) {
+                *joint += d * b;
+            }
+        }
+        skeleton
+    }
+
+    /// Poses and shapes all vertices.
+    pub fn pose(&self, state: &State) -> Posed {
+        let skeleton = self.skeleton_at(&state.beta);
+        let frames = state.pose.joint_frames(&skeleton);
+        let transforms = state.pose.skinning_transforms(&skeleton);
+        let joint_shifts = self.joint_basis.iter().map(|column| joint_shifts(column, &frames)).collect();
+        let vertex = |v: usize| {
+            let shaped = self.shaped(v, &state.beta);
+            let (mut p, mut n) = (Vector3::zeros(), Vector3::zeros());
+            for (j, w) in self.weights.of(v) {
+                let t = &transforms[j as usize];
+                p += (t * shaped).coords * f64::from(w);
+                n += t.rotation * self.rest_normals[v].cast::<f64>() * f64::from(w);
+            }
+            let normal = n.try_normalize(1e-9).unwrap_or_default().cast::<f32>();
+            (shaped, Point3::from(p.cast::<f32>()), normal)
+        };
+        let all: Vec<_> = (0..self.len()).into_par_iter().with_min_len(256).map(vertex).collect();
+        Posed {
+            points: all.iter().map(|a| a.1).collect(),
+            normals: all.iter().map(|a| a.2).collect(),
+            shaped: all.iter().map(|a| a.0).collect(),
+            transforms,
+            frames,
+            joint_shifts,
+        }
+    }
+
+    fn shaped(&self, v: usize, beta: &[f64]) -> Point3<f64> {
+        let mut p = self.rest[v].cast::<f64>();
+        for (d, &b) in self.basis[v * self.components..(v + 1) * self.components].iter().zip(beta) {
+            p += d.cast::<f64>() * b;
+        }
+        p
+    }
+
+    /// Writes the derivative of `normal · vertex` by all columns into `row`.
+    pub fn derivative(&self, posed: &Posed, v: usize, normal: &Vector3<f64>, columns: &Columns, row: &mut [f64]) {
+        row.fill(0.0);
+        row[..3].copy_from_slice(normal.as_slice());
+        let mut turned = Vector3::zeros();
+        let (first_beta, betas) = (columns.first_beta(), columns.betas);
+        for (j, w) in self.weights.of(v) {
+            let (transform, w) = (&posed.transforms[j as usize], f64::from(w));
+            let moved = transform * posed.shaped[v];
+            let mut joint = Joint::from_index(j as usize);
+            while let Some(ancestor) = joint {
+                if let Some(c) = columns.of(ancestor) {
+                    let lever = moved.coords - posed.frames[ancestor.index()].translation.vector;
+                    let turn = lever.cross(normal) * w;
+                    (0..3).for_each(|k| row[c + k] += turn[k]);
+                }
+                joint = ancestor.parent();
+            }
+            turned += transform.rotation.inverse() * normal * w;
+            for (slot, shifts) in row[first_beta..first_beta + betas].iter_mut().zip(&posed.joint_shifts) {
+                *slot += normal.dot(&shifts[j as usize]) * w;
+            }
+        }
+        let basis = &self.basis[v * self.components..(v + 1) * self.components];
+        for (slot, d) in row[first_beta..first_beta + betas].iter_mut().zip(basis) {
+            *slot += turned.dot(&d.cast::<f64>());
+        }
+    }
+}
+
+/// Translation of each joint's `posed_from_rest` per unit of one component: dP_k − R_k dJ_k.
+fn joint_shifts(column: &[Vector3<f64>], frames: &[Isometry3<f64>]) -> Vec<Vector3<f64>> {
+    let mut moved = [Vector3::zeros(); JOINT_COUNT];
+    for joint in JOINTS {
+        let i = joint.index();
+        moved[i] = match joint.parent() {
+            None => column[i],
+            Some(p) => moved[p.index()] + frames[p.index()].rotation * (column[i] - column[p.index()]),
+        };
+    }
+    (0..JOINT_COUNT).map(|i| moved[i] - frames[i].rotation * column[i]).collect()
+}
+
+impl State {
+    /// The state after the step `delta` over `columns`: rotations are about the joint, along the world's axes.
+    pub fn stepped(&self, delta: &[f64], columns: &Columns, frames: &[Isometry3<f64>]) -> Self {
+        let mut next = self.clone();
+        next.pose.translation += Vector3::new(delta[0], delta[1], delta[2]);
+        for &joint in &columns.joints {
+            let Some(c) = columns.of(joint) else { continue };
+            let world = Vector3::new(delta[c], delta[c + 1], delta[c + 2]);
+            let local = parent_rotation(joint, frames).inverse() * world;
+            let rotation = next.pose.rotation_mut(joint);
+            *rotation = UnitQuaternion::from_scaled_axis(local) * *rotation;
+            rotation.renormalize();
+        }
+        for (b, d) in next.beta.iter_mut().zip(&delta[columns.first_beta()..]) {
+            *b += d;
+        }
+        next
+    }
+}
+
+/// World orientation of the frame that `joint`'s local rotation is expressed in.
+pub(crate) fn parent_rotation(joint: Joint, frames: &[Isometry3<f64>]) -> UnitQuaternion<f64> {
+    joint.parent().map_or_else(UnitQuaternion::identity, |p| frames[p.index()].rotation)
+}
+
+/// Inverse of the left Jacobian of SO(3): how a rotation vector changes for a small turn on the left.
+pub(crate) fn left_jacobian_inverse(v: &Vector3<f64>) -> Matrix3<f64> {
+    let angle = v.norm();
+    let cross = v.cross_matrix();
+    let factor = if angle < 1e-4 {
+        1.0 / 12.0
+    } else {
+        let half = 0.5 * angle;
+        (1.0 - half * half.cos() / half.sin().max(1e-9)) / (angle * angle)
+    };
+    Matrix3::identity() - cross * 0.5 + cross * cross * factor
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bent(model: &BodyModel) -> State {
+        let mut pose = Pose::identity();
+        pose.translation = Vector3::new(0.1, -0.05, 0.2);
+        for (i, r) in pose.rotations.iter_mut().enumerate() {
+            let t = i as f64;
+            *r = UnitQuaternion::from_scaled_axis(Vector3::new(t.sin(), (1.7 * t).cos(), (0.6 * t).sin()) * 0.3);
+        }
+        let beta = (0..model.components.len()).map(|i| (i as f64 * 0.9).sin()).collect();
+        State { pose, beta }
+    }
+
+    #[test]
+    fn derivatives_agree_with_finite_differences() {
+        let model = BodyModel::load_default().unwrap();
+        let picked = Thinned::of_vertices((0..model.mean.len() as u32).step_by(397).collect());
+        let body = Articulated::of_model(&model, &picked, 12);
+        let mut state = bent(&model);
+        state.beta.truncate(12);
+        let columns = Columns::new(JOINTS.to_vec(), 12);
+        let posed = body.pose(&state);
+        let normal = Vector3::new(0.3, -0.5, 0.8).normalize();
+        let project = |s: &State, v: usize| body.pose_exact(s, v).coords.dot(&normal);
+        let mut row = vec![0.0; columns.len()];
+        for v in 0..body.len() {
+            body.derivative(&posed, v, &normal, &columns, &mut row);
+            for c in 0..columns.len() {
+                let step = |h: f64| {
+                    let mut delta = vec![0.0; columns.len()];
+                    delta[c] = h;
+                    project(&state.stepped(&delta, &columns, &posed.frames), v)
+                };
+                let numeric = (step(1e-5) - step(-1e-5)) / 2e-5;
+                assert!((row[c] - numeric).abs() < 1e-6, "vertex {v} column {c}: {} against {numeric}", row[c]);
+            }
+        }
+    }
+
+    impl Articulated {
+        fn pose_exact(&self, state: &State, v: usize) -> Point3<f64> {
+            let transforms = state.pose.skinning_transforms(&self.skeleton_at(&state.beta));
+            let shaped = self.shaped(v, &state.beta);
+            let sum: Vector3<f64> =
+                self.weights.of(v).map(|(j, w)| (transforms[j as usize] * shaped).coords * f64::from(w)).sum();
+            Point3::from(sum)
+        }
+    }
+
+    #[test]
+    fn left_jacobian_inverse_agrees_with_finite_differences() {
+        let v = Vector3::new(0.4, -0.9, 0.3);
+        let turned =
+            |d: Vector3<f64>| (UnitQuaternion::from_scaled_axis(d) * UnitQuaternion::from_scaled_axis(v)).scaled_axis();
+        let jacobian = left_jacobian_inverse(&v);
+        for k in 0..3 {
+            let d = Vector3::ith(k, 1e-6);
+            let numeric = (turned(d) - turned(-d)) / 2e-6;
+            assert!((jacobian.column(k) - numeric).norm() < 1e-7);
+        }
+    }
+}

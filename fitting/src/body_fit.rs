@@ -1,0 +1,234 @@
+//! Shape and pose of the statistical body from one scan (Hu et al. 2017, §5.2, eq. 4), then conformation.
+
+use nalgebra::Point3;
+use toile_character::{BodyModel, Pose, Skeleton, SkinnedMesh, skinning};
+use toile_geometry::Mesh;
+
+use crate::{
+    FitSettings, FittingError, Mend, Verdict,
+    articulated::{Articulated, Columns, State},
+    cloud::{Cloud, Samples},
+    conform::{Conformed, conform},
+    correspond::Gate,
+    level::{Level, LevelResult, body_joints},
+    measure::{Measurements, measure},
+    prepare::{Prepared, prepare},
+    prior::JointPrior,
+    start::{Start, starts},
+    thin::Thinned,
+    verdict::{FitReport, judge},
+};
+
+/// The body of one scan.
+#[derive(Debug, Clone)]
+pub struct BodyFit {
+    /// Shape coefficients, in standard deviations.
+    pub beta: Vec<f64>,
+    /// Joint angles θ relative to the A-pose rest, in the (mended) scan's frame.
+    pub pose: Pose,
+    /// Joints of this body at rest (A-pose).
+    pub skeleton: Skeleton,
+    /// The conformed body at rest: `body.posed(&pose)` lies on the scan; closed, template topology.
+    pub body: SkinnedMesh,
+    /// The statistical model alone, posed in the scan's frame.
+    pub model_mesh: Mesh,
+    /// How the input was brought to metres and upright; the identity for a scan as it should be.
+    pub mend: Mend,
+    /// Stature and girths of the conformed body.
+    pub measurements: Measurements,
+    /// Residuals, coverage, iterations, notices.
+    pub report: FitReport,
+}
+
+impl BodyFit {
+    /// Whether the fit is to be trusted.
+    pub fn verdict(&self) -> Verdict {
+        self.report.verdict
+    }
+
+    /// The conformed body in the scan's pose and frame.
+    pub fn posed_body(&self) -> Mesh {
+        self.body.posed_mesh(&self.pose)
+    }
+}
+
+/// Fits the body model to a scan of one person: shape, pose, own surface, measures.
+///
+/// `scan`: a triangle mesh of one standing person, any heading; metres and +Y up (millimetres, centimetres and other
+/// up axes are mended with a notice, see [`BodyFit::mend`]). The vertex attribute `filled` (1 where nothing was seen)
+/// lowers trust. Source: Hu et al. 2017, eq. 4, as Gauss–Newton on robust point-to-plane distances in both directions
+/// with analytic derivatives, coarse to fine. Same result for any number of threads.
+///
+/// # Errors
+/// [`FittingError`] where the mesh cannot be a person or leaves the body undetermined. A fit that should not be
+/// trusted is no error: read [`BodyFit::verdict`].
+pub fn fit_body(
+    model: &BodyModel,
+    scan: &Mesh,
+    settings: &FitSettings,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<BodyFit, FittingError> {
+    check(settings)?;
+    progress(0.0);
+    let prepared = prepare(scan)?;
+    let trust = trust_of(&prepared.mesh);
+    let starts = starts(model, &prepared.mesh, &trust, &prepared.ups, settings.headings)?;
+    progress(0.25);
+    let (state, up, coarse_iterations) = best_start(model, &prepared, &trust, settings, starts)?;
+    let (scan, state, mend) = stand(&prepared, model, state, up);
+    progress(0.45);
+    let fine = refine(model, &scan, &trust, settings, state)?;
+    progress(0.7);
+    let conformed = conform(model, &fine.state, &scan, &trust, settings)?;
+    progress(0.95);
+    let fit = assemble(model, &scan, &trust, fine, conformed, Context { prepared, mend, coarse_iterations });
+    progress(1.0);
+    Ok(fit)
+}
+
+fn check(settings: &FitSettings) -> Result<(), FittingError> {
+    let bad = |name, reason: &str| Err(FittingError::Setting { name, reason: reason.into() });
+    if settings.components == 0 {
+        return bad("components", "is 0; at least one shape component is needed");
+    }
+    if !(settings.noise > 0.0 && settings.shape_sigma > 0.0) {
+        return bad("noise", "noise and shape_sigma must be above 0");
+    }
+    if !(settings.conformation.stiffness_length > 0.0 && settings.conformation.extremity_length > 0.0) {
+        return bad("conformation", "its lengths must be above 0");
+    }
+    Ok(())
+}
+
+/// How far each scan vertex is trusted, 0 to 1: what was filled in by fusion was not seen.
+pub(crate) fn trust_of(scan: &Mesh) -> Vec<f32> {
+    match scan.attributes.get("filled") {
+        Some(filled) => filled.iter().map(|f| 1.0 - 0.98 * f.clamp(0.0, 1.0)).collect(),
+        None => vec![1.0; scan.positions.len()],
+    }
+}
+
+/// Takes the two best starts to the middle resolution, where front and back differ clearly.
+fn best_start(
+    model: &BodyModel,
+    prepared: &Prepared,
+    trust: &[f32],
+    settings: &FitSettings,
+    starts: Vec<Start>,
+) -> Result<(State, usize, usize), FittingError> {
+    let gate = Gate { distance: 0.1, slip: 0.04, min_cos: 0.5, kernel: 0.025, noise: 0.006 };
+    let resolution = Resolution { cell: 0.014, body_cell: 0.028, components: 12, iterations: 10, gate };
+    let mut best: Option<(f64, State, usize)> = None;
+    let mut iterations = starts.iter().map(|s| s.iterations).sum();
+    for start in starts.into_iter().take(2) {
+        let result = resolution.run(model, &prepared.mesh, trust, settings, start.state)?;
+        iterations += result.iterations;
+        if best.as_ref().is_none_or(|b| result.matches.misfit < b.0) {
+            best = Some((result.matches.misfit, result.state, start.up));
+        }
+    }
+    let (_, state, up) = best.ok_or(FittingError::Singular { what: "the heading" })?;
+    Ok((state, up, iterations))
+}
+
+/// Turns scan and state upright.
+fn stand(prepared: &Prepared, model: &BodyModel, mut state: State, up: usize) -> (Mesh, State, Mend) {
+    let turn = Mend { scale: 1.0, rotation: prepared.ups[up] };
+    let skeleton = model.skeleton_at(&state.beta);
+    if !turn.is_identity() {
+        let turned = nalgebra::Isometry3::from_parts(nalgebra::Translation3::identity(), turn.rotation);
+        state.pose = state.pose.moved(&turned, &skeleton);
+    }
+    (turn.apply(&prepared.mesh), state, Mend { scale: prepared.scale, rotation: turn.rotation })
+}
+
+fn refine(
+    model: &BodyModel,
+    scan: &Mesh,
+    trust: &[f32],
+    settings: &FitSettings,
+    state: State,
+) -> Result<LevelResult, FittingError> {
+    let gate = Gate { distance: 0.05, slip: 0.015, min_cos: 0.6, kernel: 0.010, noise: 0.003 };
+    let middle = Resolution { cell: 0.009, body_cell: 0.018, components: settings.components, iterations: 8, gate };
+    let first = middle.run(model, scan, trust, settings, state)?;
+    let gate = Gate { distance: 0.025, slip: 0.01, kernel: 0.006, noise: settings.noise as f32, ..gate };
+    let iterations = settings.fine_iterations;
+    let fine = Resolution { cell: 0.006, body_cell: 0.010, components: settings.components, iterations, gate };
+    let mut last = fine.run(model, scan, trust, settings, first.state)?;
+    last.iterations += first.iterations;
+    Ok(last)
+}
+
+/// Sampling and gates of one level.
+struct Resolution {
+    cell: f32,
+    body_cell: f32,
+    components: usize,
+    iterations: usize,
+    gate: Gate,
+}
+
+impl Resolution {
+    fn run(
+        &self,
+        model: &BodyModel,
+        scan: &Mesh,
+        trust: &[f32],
+        settings: &FitSettings,
+        mut state: State,
+    ) -> Result<LevelResult, FittingError> {
+        let empty = || FittingError::Scan("its triangles have no area".into());
+        let cloud = Cloud::new(Samples::of_mesh(scan, &scan.normals, trust, self.cell)).ok_or_else(empty)?;
+        let reverse = Samples::of_mesh(scan, &scan.normals, trust, 1.5 * self.cell);
+        let mesh = Mesh::new(model.mean.clone(), model.triangles.clone());
+        let picked = Thinned::new(&mesh, &mesh.vertex_normals(), self.body_cell, |v| !model.inner[v]);
+        let components = self.components.min(settings.components);
+        let body = Articulated::of_model(model, &picked, components);
+        state.beta.resize(components.min(model.components.len()), 0.0);
+        let columns = Columns::new(body_joints(), state.beta.len());
+        let level = Level {
+            body: &body,
+            scan: &cloud,
+            reverse: &reverse,
+            gate: self.gate,
+            columns,
+            iterations: self.iterations,
+            shape_sigma: settings.shape_sigma,
+        };
+        level.run(state, &JointPrior::standing(&model.mean_skeleton))
+    }
+}
+
+struct Context {
+    prepared: Prepared,
+    mend: Mend,
+    coarse_iterations: usize,
+}
+
+fn assemble(
+    model: &BodyModel,
+    scan: &Mesh,
+    trust: &[f32],
+    fine: LevelResult,
+    conformed: Conformed,
+    context: Context,
+) -> BodyFit {
+    let State { pose, beta } = fine.state.clone();
+    let skeleton = model.skeleton_at(&beta);
+    let transforms = pose.skinning_transforms(&skeleton);
+    let rest: Vec<Point3<f32>> = skinning::unskin(&conformed.points, &model.weights, &transforms);
+    let mut mesh = Mesh::new(rest, model.triangles.clone());
+    mesh.recompute_normals();
+    let measurements = measure(&mesh, &model.inner);
+    let mut model_mesh = Mesh::new(model.posed(&beta, &pose), model.triangles.clone());
+    model_mesh.recompute_normals();
+    let body = SkinnedMesh { mesh, skeleton: skeleton.clone(), weights: model.weights.clone() };
+    let mut notices = context.prepared.notices;
+    if context.mend.rotation.angle() > 1e-9 {
+        notices.push("the scan does not stand on +Y; turned upright".into());
+    }
+    let mut report = judge(model, scan, trust, &fine, &conformed.points, &measurements, notices);
+    report.iterations += context.coarse_iterations;
+    BodyFit { beta, pose, skeleton, body, model_mesh, mend: context.mend, measurements, report }
+}

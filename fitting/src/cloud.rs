@@ -1,0 +1,154 @@
+//! An oriented point cloud with a k-d tree: what closest points are looked up in.
+
+use std::num::NonZero;
+
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nalgebra::{Point3, Vector3};
+use toile_geometry::Mesh;
+
+/// How many neighbours are tried for one with a compatible normal.
+const CANDIDATES: NonZero<usize> = NonZero::new(12).expect("twelve is not zero");
+
+/// Oriented samples of a surface.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Samples {
+    pub points: Vec<Point3<f32>>,
+    /// Unit normals.
+    pub normals: Vec<Vector3<f32>>,
+    /// Area that a sample stands for, square metres.
+    pub areas: Vec<f32>,
+    /// The same times how far it is trusted.
+    pub weights: Vec<f32>,
+    /// sRGB colours 0–255, or empty.
+    pub colors: Vec<[f32; 3]>,
+}
+
+/// Samples with a k-d tree over them.
+pub(crate) struct Cloud {
+    pub samples: Samples,
+    tree: ImmutableKdTree<f32, 3>,
+}
+
+impl Samples {
+    /// Thins a mesh to about one sample per grid cell of `cell` metres and main direction of the normal, so that the
+    /// two sides of a thin part stay apart. `trust` (0 to 1, one a vertex) scales the weights.
+    pub fn of_mesh(mesh: &Mesh, normals: &[Vector3<f32>], trust: &[f32], cell: f32) -> Self {
+        let areas = vertex_areas(mesh);
+        let mut keyed: Vec<([i32; 4], u32)> = (0..mesh.positions.len())
+            .filter(|&v| areas[v] > 0.0 && normals[v] != Vector3::zeros())
+            .map(|v| (key(&mesh.positions[v], &normals[v], cell), v as u32))
+            .collect();
+        keyed.sort_unstable();
+        let mut out = Self::default();
+        for group in keyed.chunk_by(|a, b| a.0 == b.0) {
+            out.push_mean(mesh, normals, &areas, trust, group);
+        }
+        out
+    }
+
+    fn push_mean(
+        &mut self,
+        mesh: &Mesh,
+        normals: &[Vector3<f32>],
+        areas: &[f32],
+        trust: &[f32],
+        g: &[([i32; 4], u32)],
+    ) {
+        let (mut point, mut normal, mut color) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
+        let (mut area, mut weight) = (0.0, 0.0);
+        for v in g.iter().map(|k| k.1 as usize) {
+            let a = areas[v];
+            point += mesh.positions[v].coords * a;
+            normal += normals[v] * a;
+            if let Some(c) = mesh.colors.get(v) {
+                color += Vector3::from(c.map(f32::from)) * a;
+            }
+            area += a;
+            weight += a * trust[v];
+        }
+        let Some(normal) = normal.try_normalize(1e-12) else { return };
+        self.points.push(Point3::from(point / area));
+        self.normals.push(normal);
+        self.areas.push(area);
+        self.weights.push(weight);
+        if !mesh.colors.is_empty() {
+            self.colors.push((color / area).into());
+        }
+    }
+}
+
+impl Cloud {
+    /// Builds the tree; `None` where there is no sample.
+    pub fn new(samples: Samples) -> Option<Self> {
+        let entries: Vec<[f32; 3]> = samples.points.iter().map(|p| [p.x, p.y, p.z]).collect();
+        if entries.is_empty() {
+            return None;
+        }
+        let tree = ImmutableKdTree::new_from_slice(&entries).ok()?;
+        Some(Self { samples, tree })
+    }
+
+    /// The nearest sample within `max_distance` whose normal makes a cosine of at least `min_cos` with `normal`.
+    pub fn nearest(&self, p: &Point3<f32>, normal: &Vector3<f32>, max_distance: f32, min_cos: f32) -> Option<u32> {
+        let limit = max_distance * max_distance;
+        let fits = |item: u32| self.samples.normals[item as usize].dot(normal) >= min_cos;
+        let query = [p.x, p.y, p.z];
+        let first = self.tree.query(&query).nearest_one::<SquaredEuclidean<f32>>().execute();
+        if first.distance > limit {
+            return None;
+        }
+        if fits(first.item) {
+            return Some(first.item);
+        }
+        let near = self.tree.query(&query).nearest_n::<SquaredEuclidean<f32>>(CANDIDATES).execute();
+        near.iter().filter(|n| n.distance <= limit).map(|n| n.item).find(|&i| fits(i))
+    }
+
+    /// Distance to the nearest sample, metres.
+    pub fn distance(&self, p: &Point3<f32>) -> f32 {
+        self.tree.query(&[p.x, p.y, p.z]).nearest_one::<SquaredEuclidean<f32>>().execute().distance.sqrt()
+    }
+}
+
+pub(crate) fn key(p: &Point3<f32>, n: &Vector3<f32>, cell: f32) -> [i32; 4] {
+    let axis = n.iamax();
+    let direction = 2 * axis as i32 + i32::from(n[axis] < 0.0);
+    [(p.x / cell).floor() as i32, (p.y / cell).floor() as i32, (p.z / cell).floor() as i32, direction]
+}
+
+/// A third of the area of the triangles around each vertex, square metres.
+pub(crate) fn vertex_areas(mesh: &Mesh) -> Vec<f32> {
+    let mut areas = vec![0.0; mesh.positions.len()];
+    for (t, tri) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(t);
+        let third = (b - a).cross(&(c - a)).norm() / 6.0;
+        tri.iter().for_each(|&v| areas[v as usize] += third);
+    }
+    areas
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_two_sides_of_a_thin_plate_stay_apart() {
+        let corner = |x: f32, z: f32, y: f32| Point3::new(x * 0.004, y, z * 0.004);
+        let mesh = Mesh::new(
+            vec![
+                corner(0.0, 0.0, 0.001),
+                corner(0.0, 1.0, 0.001),
+                corner(1.0, 0.0, 0.001),
+                corner(0.0, 0.0, 0.0),
+                corner(1.0, 0.0, 0.0),
+                corner(0.0, 1.0, 0.0),
+            ],
+            vec![[0, 1, 2], [3, 4, 5]],
+        );
+        let cloud = Cloud::new(Samples::of_mesh(&mesh, &mesh.vertex_normals(), &[1.0; 6], 0.01)).unwrap();
+        assert_eq!(cloud.samples.points.len(), 2);
+        let up = cloud.nearest(&Point3::new(0.001, -0.01, 0.001), &Vector3::y(), 1.0, 0.5).unwrap();
+        assert!(cloud.samples.points[up as usize].y > 0.0005);
+        assert!(cloud.nearest(&Point3::origin(), &Vector3::x(), 1.0, 0.5).is_none());
+    }
+}

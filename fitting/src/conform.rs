@@ -1,0 +1,234 @@
+//! The body takes on the scan's own surface: local deformation to the closest compatible points under an elastic
+//! energy (Volino et al.'s V-Man, papers 004 §2.1.2; the mass–spring relaxation is replaced by one sparse solve).
+//!
+//! Minimised over the displacement d of all vertices, with vertex areas M and the cotangent Laplacian C:
+//! Σ Mᵢ wᵢ |dᵢ − δᵢ|² + (C ℓ² d)ᵀ M⁻¹ (C ℓ² d) + ε dᵀ M d. Details finer than about six times ℓ are left out.
+
+use faer::{
+    Mat, Side,
+    linalg::solvers::Solve,
+    sparse::{
+        SparseColMat, Triplet,
+        linalg::solvers::{Llt, SymbolicLlt},
+    },
+};
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+use toile_character::{BodyModel, Region};
+use toile_geometry::{
+    Mesh,
+    bvh::Bvh,
+    mesh::{triangle_normals, vertex_normals},
+};
+
+use crate::{ConformSettings, FitSettings, FittingError, articulated::State};
+
+/// Draws an unseen vertex back to the statistical model.
+const TIE: f64 = 2e-3;
+/// A triangle that turned by more than this cosine from the model's is taken for folded.
+const FOLD_COS: f32 = 0.2;
+
+/// The conformed body in the scan's pose.
+pub(crate) struct Conformed {
+    /// Vertices of the template.
+    pub points: Vec<Point3<f32>>,
+}
+
+/// Moves the posed model onto the scan.
+pub(crate) fn conform(
+    model: &BodyModel,
+    state: &State,
+    scan: &Mesh,
+    trust: &[f32],
+    settings: &FitSettings,
+) -> Result<Conformed, FittingError> {
+    let start = model.posed(&state.beta, &state.pose);
+    if !settings.conform {
+        return Ok(Conformed { points: start });
+    }
+    let surface =
+        Surface { scan, trust, bvh: Bvh::new(&scan.positions, &scan.triangles), settings: &settings.conformation };
+    let elastic = Elastic::new(model, &start, &settings.conformation)?;
+    let mut freedom = freedom(model);
+    let mut points = start.clone();
+    for _ in 0..settings.conformation.rounds {
+        let normals = vertex_normals(&points, &model.triangles);
+        let pulls: Vec<Pull> = (0..points.len())
+            .into_par_iter()
+            .with_min_len(128)
+            .map(|v| surface.pull(&points[v], &normals[v], freedom[v]))
+            .collect();
+        points = elastic.solve(&start, &pulls)?;
+        release_folds(model, &start, &points, &mut freedom);
+    }
+    Ok(Conformed { points: unfolded(model, &start, points) })
+}
+
+/// How far each vertex follows the scan, 0 to 1: fingers and face are thin or finely shaped, scans of them poor.
+fn freedom(model: &BodyModel) -> Vec<f64> {
+    let of = |v: usize| match model.regions[v] {
+        _ if model.inner[v] => 0.0,
+        Region::LeftHand | Region::RightHand => 0.1,
+        Region::LeftFoot | Region::RightFoot => 0.5,
+        Region::Head => 0.5,
+        _ => 1.0,
+    };
+    (0..model.mean.len()).map(of).collect()
+}
+
+struct Surface<'a> {
+    scan: &'a Mesh,
+    trust: &'a [f32],
+    bvh: Bvh,
+    settings: &'a ConformSettings,
+}
+
+/// Where the scan wants a vertex, and how strongly.
+struct Pull {
+    target: Point3<f32>,
+    weight: f64,
+}
+
+impl Surface<'_> {
+    fn pull(&self, p: &Point3<f32>, n: &Vector3<f32>, freedom: f64) -> Pull {
+        let none = Pull { target: *p, weight: 0.0 };
+        if freedom == 0.0 {
+            return none;
+        }
+        let min_cos = self.settings.min_cos as f32;
+        let fits = |t: u32| self.normal(t).dot(n) > min_cos;
+        let Some(hit) = self.bvh.closest_where(p, self.settings.reach as f32, fits) else { return none };
+        let tri = self.scan.triangles[hit.triangle as usize];
+        let blend = |f: &dyn Fn(usize) -> f32| (0..3).map(|k| f(tri[k] as usize) * hit.barycentric[k]).sum::<f32>();
+        let trust = blend(&|v| self.trust[v]);
+        let offset = p - hit.point;
+        let slip = (offset - n * offset.dot(n)).norm();
+        if slip > 0.3 * hit.distance + 0.002 {
+            return none; // the rim of a hole
+        }
+        let near = 1.0 - (f64::from(hit.distance) / self.settings.reach).powi(2);
+        Pull { target: hit.point, weight: f64::from(trust).powi(2) * near.max(0.0) * freedom }
+    }
+
+    fn normal(&self, t: u32) -> Vector3<f32> {
+        let [a, b, c] = self.scan.corners(t as usize);
+        (b - a).cross(&(c - a)).try_normalize(1e-20).unwrap_or_default()
+    }
+}
+
+/// The bending energy of the template in the scan's pose.
+struct Elastic {
+    areas: Vec<f64>,
+    /// Upper triangle of the bending matrix, column-major; every diagonal entry is there.
+    entries: Vec<Triplet<usize, usize, f64>>,
+    symbolic: SymbolicLlt<usize>,
+}
+
+impl Elastic {
+    fn new(model: &BodyModel, points: &[Point3<f32>], settings: &ConformSettings) -> Result<Self, FittingError> {
+        let mesh = Mesh::new(points.to_vec(), model.triangles.clone());
+        let floor = 1e-7; // a degenerate triangle must not make a vertex infinitely stiff
+        let areas: Vec<f64> = crate::cloud::vertex_areas(&mesh).iter().map(|&a| f64::from(a).max(floor)).collect();
+        let rows = scaled_laplacian(model, points, &areas, settings);
+        let entries = squared(&rows);
+        let n = points.len();
+        let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).map_err(|_| singular())?;
+        let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Upper).map_err(|_| singular())?;
+        Ok(Self { areas, entries, symbolic })
+    }
+
+    fn solve(&self, start: &[Point3<f32>], pulls: &[Pull]) -> Result<Vec<Point3<f32>>, FittingError> {
+        let n = start.len();
+        let mut entries = self.entries.clone();
+        for (v, pull) in pulls.iter().enumerate() {
+            entries.push(Triplet::new(v, v, self.areas[v] * (pull.weight + TIE)));
+        }
+        let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).map_err(|_| singular())?;
+        let factor =
+            Llt::try_new_with_symbolic(self.symbolic.clone(), matrix.as_ref(), Side::Upper).map_err(|_| singular())?;
+        let rhs =
+            Mat::from_fn(n, 3, |v, k| self.areas[v] * pulls[v].weight * f64::from(pulls[v].target[k] - start[v][k]));
+        let d = factor.solve(&rhs);
+        let moved = |v: usize| Vector3::new(d[(v, 0)], d[(v, 1)], d[(v, 2)]).cast::<f32>();
+        Ok((0..n).map(|v| start[v] + moved(v)).collect())
+    }
+}
+
+fn singular() -> FittingError {
+    FittingError::Singular { what: "the conformation" }
+}
+
+/// Rows M^-½ ℓ² C of the bending energy: (column, value), ascending.
+fn scaled_laplacian(
+    model: &BodyModel,
+    points: &[Point3<f32>],
+    areas: &[f64],
+    settings: &ConformSettings,
+) -> Vec<Vec<(u32, f64)>> {
+    let mut rows: Vec<std::collections::BTreeMap<u32, f64>> = vec![Default::default(); points.len()];
+    for t in &model.triangles {
+        for k in 0..3 {
+            let (i, j, o) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
+            let (a, b) = (points[i as usize] - points[o as usize], points[j as usize] - points[o as usize]);
+            let sine = f64::from(a.cross(&b).norm()).max(1e-9);
+            let w = (0.5 * f64::from(a.dot(&b)) / sine).clamp(0.02, 5.0);
+            for (p, q) in [(i, j), (j, i)] {
+                *rows[p as usize].entry(q).or_default() -= w;
+                *rows[p as usize].entry(p).or_default() += w;
+            }
+        }
+    }
+    rows.into_iter()
+        .enumerate()
+        .map(|(v, row)| {
+            let stiff = model.inner[v] || model.regions[v].is_extremity();
+            let length = if stiff { settings.extremity_length } else { settings.stiffness_length };
+            let scale = length * length / areas[v].sqrt();
+            row.into_iter().map(|(c, w)| (c, w * scale)).collect()
+        })
+        .collect()
+}
+
+/// Upper triangle of RᵀR.
+fn squared(rows: &[Vec<(u32, f64)>]) -> Vec<Triplet<usize, usize, f64>> {
+    let mut out = Vec::with_capacity(rows.len() * 28);
+    for row in rows {
+        for (k, &(i, a)) in row.iter().enumerate() {
+            for &(j, b) in &row[k..] {
+                out.push(Triplet::new(i as usize, j as usize, a * b));
+            }
+        }
+    }
+    out
+}
+
+/// Corners of triangles that turned over follow the scan no longer.
+fn release_folds(model: &BodyModel, start: &[Point3<f32>], points: &[Point3<f32>], freedom: &mut [f64]) {
+    for t in folded(model, start, points) {
+        for v in model.triangles[t] {
+            freedom[v as usize] *= 0.1;
+        }
+    }
+}
+
+fn folded(model: &BodyModel, start: &[Point3<f32>], points: &[Point3<f32>]) -> Vec<usize> {
+    let before = triangle_normals(start, &model.triangles);
+    let after = triangle_normals(points, &model.triangles);
+    (0..before.len()).filter(|&t| before[t].dot(&after[t]) < FOLD_COS).collect()
+}
+
+/// Where folds are left, the neighbourhood goes back towards the model, step by step.
+fn unfolded(model: &BodyModel, start: &[Point3<f32>], mut points: Vec<Point3<f32>>) -> Vec<Point3<f32>> {
+    for _ in 0..8 {
+        let folds = folded(model, start, &points);
+        if folds.is_empty() {
+            break;
+        }
+        let mut back = vec![false; points.len()];
+        folds.iter().for_each(|&t| model.triangles[t].iter().for_each(|&v| back[v as usize] = true));
+        for (v, _) in back.iter().enumerate().filter(|b| *b.1) {
+            points[v] = nalgebra::center(&points[v], &start[v]);
+        }
+    }
+    points
+}

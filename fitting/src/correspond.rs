@@ -1,0 +1,113 @@
+//! Closest compatible points in both directions, with robust weights.
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use crate::{
+    articulated::{Articulated, Posed},
+    cloud::{Cloud, Samples},
+    equations::Residual,
+};
+
+/// What a pair of points must fulfil, and how it is weighed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Gate {
+    /// Largest distance, metres.
+    pub distance: f32,
+    /// Largest slip along the surface, metres: beyond it the nearest point is the rim of a hole.
+    pub slip: f32,
+    /// Smallest cosine of the normals.
+    pub min_cos: f32,
+    /// Scale of the robust kernel (Geman and McClure), metres.
+    pub kernel: f32,
+    /// Standard deviation of a good residual, metres.
+    pub noise: f32,
+}
+
+/// Residuals of both directions and how well the surfaces cover each other.
+pub(crate) struct Matches {
+    pub residuals: Vec<Residual>,
+    /// Robust cost 0–1, averaged over the areas of both surfaces; what has no match counts 1.
+    pub misfit: f64,
+    /// Part of the body's area with a match.
+    pub body_covered: f64,
+    /// Part of the scan's trusted area with a match.
+    pub scan_covered: f64,
+}
+
+/// How many independent measurements the data of a level stand for, however many points sample it.
+pub(crate) const INDEPENDENT: f64 = 2000.0;
+
+/// Pairs each body vertex with the scan, and each of `reverse` with the body.
+pub(crate) fn matches(body: &Articulated, posed: &Posed, scan: &Cloud, reverse: &Samples, gate: &Gate) -> Matches {
+    let forward: Vec<Option<Residual>> = (0..body.len())
+        .into_par_iter()
+        .with_min_len(128)
+        .map(|v| {
+            let (p, n) = (&posed.points[v], &posed.normals[v]);
+            let q = scan.nearest(p, n, gate.distance, gate.min_cos)? as usize;
+            let trust = f64::from(scan.samples.weights[q] / scan.samples.areas[q].max(f32::MIN_POSITIVE));
+            let weight = f64::from(body.areas[v]) * trust;
+            gate.pair(v as u32, p, &scan.samples.points[q], &scan.samples.normals[q], weight)
+        })
+        .collect();
+    let backward = backward(posed, reverse, gate);
+    let body_area: Vec<f64> = body.areas.iter().map(|&a| f64::from(a)).collect();
+    let scan_area: Vec<f64> = reverse.weights.iter().map(|&a| f64::from(a)).collect();
+    let (mut residuals, forward_misfit, body_covered) = weigh(forward, &body_area, gate);
+    let (more, backward_misfit, scan_covered) = weigh(backward, &scan_area, gate);
+    residuals.extend(more);
+    Matches { residuals, misfit: 0.5 * (forward_misfit + backward_misfit), body_covered, scan_covered }
+}
+
+fn backward(posed: &Posed, reverse: &Samples, gate: &Gate) -> Vec<Option<Residual>> {
+    let samples = Samples { points: posed.points.clone(), normals: posed.normals.clone(), ..Samples::default() };
+    let Some(surface) = Cloud::new(samples) else { return vec![None; reverse.points.len()] };
+    (0..reverse.points.len())
+        .into_par_iter()
+        .with_min_len(128)
+        .map(|k| {
+            let (q, m) = (&reverse.points[k], &reverse.normals[k]);
+            let v = surface.nearest(q, m, gate.distance, gate.min_cos)?;
+            gate.pair(v, &posed.points[v as usize], q, m, f64::from(reverse.weights[k]))
+        })
+        .collect()
+}
+
+impl Gate {
+    fn pair(&self, vertex: u32, p: &Point3<f32>, q: &Point3<f32>, m: &Vector3<f32>, weight: f64) -> Option<Residual> {
+        let d = p - q;
+        let value = d.dot(m);
+        let slip = (d - m * value).norm();
+        let fits = slip <= self.slip && value.abs() <= self.distance;
+        fits.then_some(Residual { vertex, point: *q, normal: *m, value, weight })
+    }
+
+    /// Geman and McClure's weight.
+    pub fn robust(&self, value: f32) -> f64 {
+        let s = f64::from(self.kernel).powi(2);
+        (s / (s + f64::from(value).powi(2))).powi(2)
+    }
+}
+
+/// Turns areas into weights of the normal equations; returns them with the misfit and the covered part.
+fn weigh(pairs: Vec<Option<Residual>>, areas: &[f64], gate: &Gate) -> (Vec<Residual>, f64, f64) {
+    let total: f64 = areas.iter().sum::<f64>().max(1e-12);
+    let scale = 0.5 * INDEPENDENT / (total * f64::from(gate.noise).powi(2));
+    let (mut cost, mut covered) = (0.0, 0.0);
+    let mut out = Vec::with_capacity(pairs.len());
+    for (pair, &area) in pairs.into_iter().zip(areas) {
+        let Some(mut r) = pair else {
+            cost += area;
+            continue;
+        };
+        let squared = f64::from(r.value).powi(2);
+        cost += area * squared / (squared + f64::from(gate.kernel).powi(2));
+        covered += area;
+        r.weight *= scale * gate.robust(r.value);
+        if r.weight > 0.0 {
+            out.push(r);
+        }
+    }
+    (out, cost / total, covered / total)
+}

@@ -1,0 +1,224 @@
+//! Stature and girths of a body standing in the A-pose.
+//!
+//! A girth is the convex-hull perimeter of the largest closed part of a horizontal section, as a tape lies; arms are
+//! parts of their own. Chest: the largest between 70 and 73.5 % of the stature; waist: the least between 57 and 66 %;
+//! hip: the largest between 47 and 55 %.
+
+use nalgebra::{Point2, Point3};
+use rayon::prelude::*;
+use serde::Serialize;
+use toile_geometry::Mesh;
+
+/// Distance of the sections, metres.
+const STEP: f64 = 0.005;
+
+/// One girth and where it was taken.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Girth {
+    /// Height above the soles, metres.
+    pub height_m: f64,
+    /// Convex perimeter, metres; 0 where there is no closed section.
+    pub girth_m: f64,
+}
+
+/// Measures of a standing body.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Measurements {
+    /// From the soles to the crown, metres.
+    pub stature_m: f64,
+    /// Largest girth at 70 to 73.5 % of the stature.
+    pub chest: Girth,
+    /// Least girth at 57 to 66 %.
+    pub waist: Girth,
+    /// Largest girth at 47 to 55 %.
+    pub hip: Girth,
+    /// Volume, cubic metres.
+    pub volume_m3: f64,
+}
+
+/// Measures a closed body at rest in the A-pose, +Y up; `inner` vertices (mouth, eye sockets) do not count for height.
+pub fn measure(body: &Mesh, inner: &[bool]) -> Measurements {
+    let outer = || body.positions.iter().enumerate().filter(|(v, _)| !inner.get(*v).copied().unwrap_or(false));
+    let low = outer().map(|(_, p)| f64::from(p.y)).fold(f64::INFINITY, f64::min);
+    let high = outer().map(|(_, p)| f64::from(p.y)).fold(f64::NEG_INFINITY, f64::max);
+    if low >= high {
+        return Measurements::default();
+    }
+    let stature = high - low;
+    let largest = |a: &Girth, b: &Girth| a.girth_m.total_cmp(&b.girth_m);
+    let least = |a: &Girth, b: &Girth| b.girth_m.total_cmp(&a.girth_m);
+    Measurements {
+        stature_m: stature,
+        chest: extreme(body, low, stature, (0.70, 0.735), largest),
+        waist: extreme(body, low, stature, (0.57, 0.66), least),
+        hip: extreme(body, low, stature, (0.47, 0.55), largest),
+        volume_m3: body.signed_volume(),
+    }
+}
+
+fn extreme(
+    body: &Mesh,
+    floor: f64,
+    stature: f64,
+    range: (f64, f64),
+    order: impl Fn(&Girth, &Girth) -> std::cmp::Ordering,
+) -> Girth {
+    let count = ((range.1 - range.0) * stature / STEP).ceil() as usize;
+    let girths: Vec<Girth> = (0..count)
+        .into_par_iter()
+        .map(|k| {
+            let height_m = range.0 * stature + k as f64 * STEP;
+            Girth { height_m, girth_m: girth_at(body, floor + height_m) }
+        })
+        .collect();
+    // the first of equal ones, whatever `max_by` prefers
+    girths.into_iter().reduce(|a, b| if order(&b, &a).is_gt() { b } else { a }).unwrap_or_default()
+}
+
+/// Convex-hull perimeter (metres) of the largest closed part of the section at height `y`; 0 where there is none.
+pub fn girth_at(body: &Mesh, y: f64) -> f64 {
+    let mut best = (0.0, 0.0);
+    for part in section_parts(body, y) {
+        let hull = convex_hull(part);
+        let (area, perimeter) = area_and_perimeter(&hull);
+        if area > best.0 {
+            best = (area, perimeter);
+        }
+    }
+    best.1
+}
+
+/// Points of each connected part of the horizontal section at height `y`, seen from above.
+fn section_parts(body: &Mesh, y: f64) -> Vec<Vec<Point2<f64>>> {
+    let side = |v: u32| f64::from(body.positions[v as usize].y) > y;
+    let mut edges: Vec<[u32; 2]> = Vec::new();
+    let mut segments: Vec<[[u32; 2]; 2]> = Vec::new();
+    for t in &body.triangles {
+        let crossed: Vec<[u32; 2]> = (0..3)
+            .map(|k| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])])
+            .filter(|e| side(e[0]) != side(e[1]))
+            .collect();
+        if let [a, b] = crossed[..] {
+            segments.push([a, b]);
+            edges.extend([a, b]);
+        }
+    }
+    edges.sort_unstable();
+    edges.dedup();
+    let index = |e: &[u32; 2]| edges.binary_search(e).unwrap_or(0) as u32;
+    let links: Vec<[u32; 3]> = segments.iter().map(|[a, b]| [index(a), index(b), index(b)]).collect();
+    let (labels, count) = toile_geometry::topology::vertex_components(edges.len(), &links);
+    let mut parts = vec![Vec::new(); count];
+    for (edge, label) in edges.iter().zip(labels) {
+        parts[label as usize].push(crossing(body, edge, y));
+    }
+    parts
+}
+
+fn crossing(body: &Mesh, edge: &[u32; 2], y: f64) -> Point2<f64> {
+    let [a, b]: [Point3<f64>; 2] = edge.map(|v| body.positions[v as usize].cast());
+    let rise = b.y - a.y;
+    let t = if rise.abs() > 1e-12 { ((y - a.y) / rise).clamp(0.0, 1.0) } else { 0.5 };
+    let p = a + (b - a) * t;
+    Point2::new(p.x, p.z)
+}
+
+/// Corners of the convex hull, counter-clockwise (Andrew's monotone chain).
+fn convex_hull(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let mut hull: Vec<Point2<f64>> = Vec::with_capacity(2 * points.len());
+    let mut half = |points: &mut dyn Iterator<Item = &Point2<f64>>| {
+        let base = hull.len();
+        for p in points {
+            while hull.len() >= base + 2 && turn(&hull[hull.len() - 2], &hull[hull.len() - 1], p) <= 0.0 {
+                hull.pop();
+            }
+            hull.push(*p);
+        }
+        hull.pop();
+    };
+    half(&mut points.iter());
+    half(&mut points.iter().rev());
+    hull
+}
+
+fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
+    (b - a).perp(&(c - a))
+}
+
+fn area_and_perimeter(hull: &[Point2<f64>]) -> (f64, f64) {
+    let sides = (0..hull.len()).map(|i| (hull[i], hull[(i + 1) % hull.len()]));
+    let area = 0.5 * sides.clone().map(|(a, b)| a.coords.perp(&b.coords)).sum::<f64>();
+    (area, sides.map(|(a, b)| (b - a).norm()).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{PI, TAU};
+
+    use super::*;
+
+    /// A closed elliptic column around `x`, with many sides.
+    fn column(x: f32, a: f32, b: f32, height: f32) -> Mesh {
+        const N: u32 = 400;
+        let mut mesh = Mesh::default();
+        for y in [0.0, height] {
+            for k in 0..N {
+                let t = TAU as f32 * k as f32 / N as f32;
+                mesh.positions.push(Point3::new(x + a * t.cos(), y, b * t.sin()));
+            }
+        }
+        for k in 0..N {
+            let n = (k + 1) % N;
+            mesh.triangles.extend([[k, k + N, n], [n, k + N, n + N]]);
+        }
+        let (bottom, top) = (mesh.positions.len() as u32, mesh.positions.len() as u32 + 1);
+        mesh.positions.extend([Point3::new(x, 0.0, 0.0), Point3::new(x, height, 0.0)]);
+        for k in 0..N {
+            let n = (k + 1) % N;
+            mesh.triangles.extend([[k, n, bottom], [k + N, top, n + N]]);
+        }
+        mesh
+    }
+
+    fn ellipse_perimeter(a: f64, b: f64) -> f64 {
+        let h = ((a - b) / (a + b)).powi(2);
+        PI * (a + b) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()))
+    }
+
+    #[test]
+    fn an_elliptic_columns_girth_is_the_ellipses_perimeter_and_arms_do_not_count() {
+        let mut mesh = column(0.0, 0.18, 0.12, 1.8);
+        let arm = column(0.35, 0.05, 0.05, 1.5);
+        let shift = mesh.positions.len() as u32;
+        mesh.positions.extend(arm.positions);
+        mesh.triangles.extend(arm.triangles.iter().map(|t| t.map(|v| v + shift)));
+        let m = measure(&mesh, &[]);
+        let truth = ellipse_perimeter(0.18, 0.12);
+        for girth in [m.chest, m.waist, m.hip] {
+            assert!((girth.girth_m - truth).abs() < 5e-4, "{} against {truth}", girth.girth_m);
+        }
+        assert!((m.stature_m - 1.8).abs() < 1e-6);
+        assert!((m.chest.height_m - 1.26).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_dent_does_not_shorten_the_tape() {
+        let hull = convex_hull(
+            [(0.0, 0.0), (1.0, 0.0), (0.5, 0.2), (1.0, 1.0), (0.0, 1.0), (0.5, 0.9)]
+                .map(|(x, y)| Point2::new(x, y))
+                .to_vec(),
+        );
+        assert_eq!(area_and_perimeter(&hull), (1.0, 4.0));
+    }
+
+    #[test]
+    fn nothing_measures_nothing() {
+        assert_eq!(measure(&Mesh::default(), &[]), Measurements::default());
+        assert_eq!(girth_at(&column(0.0, 0.1, 0.1, 1.0), 2.0), 0.0);
+    }
+}
