@@ -230,7 +230,7 @@ fn the_population_follows_ansur() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(8))]
+    #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn unposing_takes_back_posing(seed in 0u64..1000) {
