@@ -1,1 +1,38 @@
 //! Depth frames to a scan: filtering, tracking, loop closing, TSDF, surface extraction, clean-up.
+//!
+//! The way of a take:
+//!
+//! 1. [`depth_filter`] drops depth edges; [`volume`] and [`floor`] find the subject and cut everything else away;
+//! 2. [`track`] registers each frame to the model so far ([`tsdf`], [`raycast`]) from a pose that [`motion`]
+//!    predicts; trusted frames are fused ([`integrate`]);
+//! 3. [`closing`] optimises all poses together over overlapping frame pairs, so that the turn closes;
+//! 4. the frames are fused again and registered to the whole model;
+//! 5. [`surface`] extracts the mesh, [`clean_up`] makes it one closed, smooth, light surface.
+//!
+//! [`fuse`] runs all of it over a source; [`Fuser`] takes frames one by one.
+
+pub mod clean_up;
+pub mod closing;
+mod cube_table;
+pub mod depth_filter;
+pub mod error;
+pub mod floor;
+pub mod fuser;
+pub mod integrate;
+pub mod motion;
+pub mod normals;
+pub mod raycast;
+pub mod report;
+pub mod scan;
+pub mod settings;
+pub mod surface;
+pub mod track;
+pub mod tsdf;
+pub mod view;
+pub mod volume;
+
+pub use error::FusionError;
+pub use fuser::{Fuser, Outcome, fuse};
+pub use report::{FusionReport, Timings};
+pub use scan::{Scan, TrackedFrame};
+pub use settings::{FusionSettings, KnownPose, Prior, Volume};

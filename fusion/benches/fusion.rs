@@ -1,0 +1,2 @@
+//! Benchmarks of the fusion stage; cases are named stage/case/size.
+fn main() {}

@@ -1,0 +1,85 @@
+//! What a caller may choose; every field has a default that suits a person on a turntable.
+
+use serde::{Deserialize, Serialize};
+use toile_geometry::Rigid;
+
+/// What of the frames is fused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Volume {
+    /// The subject that turns before a resting camera: floor, disk, walls and what rests are cut away.
+    #[default]
+    Auto,
+    /// Everything that the sensor saw (a room, a hand-held camera).
+    All,
+}
+
+/// What is assumed about the motion between frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Prior {
+    /// The subject turns about a resting axis; axis and rate are found from the data.
+    #[default]
+    Turntable,
+    /// Nothing but that the motion goes on as before.
+    None,
+}
+
+/// A pose known beforehand, matched to frames by device time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct KnownPose {
+    /// Device time of the frame, nanoseconds.
+    pub device_time_ns: i64,
+    /// Pose of the depth camera; the scan comes out in this frame.
+    pub scan_from_camera: Rigid,
+}
+
+/// Settings of the stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FusionSettings {
+    /// Edge of a voxel, metres. Default 0.004. Smaller resolves more and costs its inverse square.
+    pub voxel_size: f64,
+    /// Truncation distance of the signed distance field, metres. Default 0.016; at least three voxels.
+    pub truncation: f64,
+    /// What is fused. Default: the subject alone.
+    pub volume: Volume,
+    /// Assumption about the motion. Default: a turntable.
+    pub prior: Prior,
+    /// Known poses; `None` (default) to track. Frames without one (nearest time within 5 ms) are dropped.
+    pub poses: Option<Vec<KnownPose>>,
+    /// A pixel is an edge, and dropped, where its depth differs from a neighbour's by more than this many pixel
+    /// widths (the tangent of the incidence angle). Default 8.3: 50 mm at 2.2 m with a focal length of 365 pixels.
+    pub jump_slope: f64,
+    /// Depth beyond this is not used, metres. Default 6.
+    pub max_depth: f64,
+    /// Rounds of joint optimisation of all poses over frame pairs after tracking (0: none). Default 8.
+    pub closing_rounds: usize,
+    /// Rounds of "fuse, then register every frame to the whole model" after closing. Default 2.
+    pub refine_rounds: usize,
+    /// Triangles of the finished scan, about. Default 80 000; 0 keeps all.
+    pub target_triangles: usize,
+    /// Close all holes, mark them in the attribute `filled`. Default true; a room is never closed.
+    pub fill_holes: bool,
+    /// Passes of non-shrinking smoothing. Default 5.
+    pub smoothing_passes: usize,
+}
+
+impl Default for FusionSettings {
+    fn default() -> Self {
+        Self {
+            voxel_size: 0.004,
+            truncation: 0.016,
+            volume: Volume::Auto,
+            prior: Prior::Turntable,
+            poses: None,
+            jump_slope: 8.3,
+            max_depth: 6.0,
+            closing_rounds: 8,
+            refine_rounds: 2,
+            target_triangles: 80_000,
+            fill_holes: true,
+            smoothing_passes: 5,
+        }
+    }
+}
