@@ -1,1 +1,44 @@
-//! A virtual dressed subject on a turning table, its sensor and its truth.
+//! A virtual depth and colour camera that looks at a virtual dressed person on a turning disk, with the truth beside.
+//!
+//! It serves the training of operators, tests, benchmarks and the sessions in `recorded/`. Everything follows from the
+//! seed in [`SyntheticSettings`]: the same bytes in every run, for any number of threads.
+//!
+//! - [`Subject`]: a person drawn from the body model, with detail that the model does not know, and garments made on them;
+//! - [`Take`]: the person in one pose with the first n garments on, the moments of its frames, each frame rendered on demand;
+//! - [`sensor`]: Kinect v1, Kinect v2 and active stereo as noise on the true depth;
+//! - [`truth`]: surfaces with layers, poses and measurements, for scoring;
+//! - [`folder::write_subject_folder`]: a subject as folders of images that `toile import` reads, with the truth;
+//! - [`record::record_subject`]: a subject as a subject folder with recordings.
+//!
+//! Room: +Y up, origin where the disk's axis meets its top, the camera on the +Z side. The subject's frame turns with
+//! the disk and equals the room's at the first frame.
+
+pub mod cut;
+pub mod dressing;
+pub mod error;
+pub mod field;
+pub mod folder;
+pub mod garment;
+pub mod noise;
+pub mod pattern;
+pub mod person;
+pub mod posture;
+pub mod random;
+pub mod record;
+pub mod room;
+pub mod sensor;
+pub mod settings;
+pub mod subdivide;
+pub mod subject;
+pub mod surface_nets;
+pub mod tailor;
+pub mod take;
+pub mod tape;
+pub mod truth;
+pub mod turntable;
+
+pub use error::SyntheticError;
+pub use sensor::SensorPreset;
+pub use settings::{GarmentKind, GarmentSettings, Pattern, Sex, SyntheticSettings};
+pub use subject::Subject;
+pub use take::{Surface, Take};

@@ -1,0 +1,52 @@
+//! A virtual subject: the person, the garments and the takes.
+
+use toile_character::BodyModel;
+
+use crate::{
+    SyntheticError,
+    garment::{self, Garment},
+    person::Person,
+    settings::SyntheticSettings,
+    take::Take,
+};
+
+/// A person with a wardrobe, ready to be recorded.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// What it was made from.
+    pub settings: SyntheticSettings,
+    /// The person at rest.
+    pub person: Person,
+    /// What take 1, 2, ... adds.
+    pub garments: Vec<Garment>,
+}
+
+impl Subject {
+    /// Makes the subject that `settings` describe, from the body model that ships with the program.
+    ///
+    /// # Errors
+    /// [`SyntheticError`] where a setting is out of range or a garment cannot be made.
+    pub fn new(settings: &SyntheticSettings) -> Result<Self, SyntheticError> {
+        settings.validate()?;
+        let model = BodyModel::load_default()?;
+        let person = Person::new(&model, settings)?;
+        let garments = garment::make_all(&model, &person, settings)?;
+        Ok(Self { settings: settings.clone(), person, garments })
+    }
+
+    /// How many takes there are: the body and one a garment.
+    pub fn take_count(&self) -> usize {
+        self.garments.len() + 1
+    }
+
+    /// The scene of take `index`.
+    ///
+    /// # Errors
+    /// [`SyntheticError::NoTake`] where there are not so many.
+    pub fn take(&self, index: usize) -> Result<Take, SyntheticError> {
+        if index >= self.take_count() {
+            return Err(SyntheticError::NoTake { take: index, last: self.take_count() - 1 });
+        }
+        Ok(Take::new(self, index))
+    }
+}

@@ -1,0 +1,276 @@
+//! How each kind of garment is cut: where it ends, how it hangs, how it creases.
+
+use nalgebra::{Point3, Vector3};
+use toile_character::{BodyModel, Joint, Region};
+
+use crate::{person::Person, random::Random, settings::GarmentKind};
+
+/// What counts as clearly outside or inside a garment's extent, metres.
+const FAR: f32 = 0.05;
+
+/// What part of the body a place belongs to, as far as tailoring cares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limb {
+    /// Trunk, legs, neck and head.
+    Trunk,
+    /// Left arm and hand.
+    LeftArm,
+    /// Right arm and hand.
+    RightArm,
+}
+
+impl Limb {
+    /// The limb of a body region.
+    pub fn of(region: Region) -> Self {
+        match region {
+            Region::LeftArm | Region::LeftHand => Self::LeftArm,
+            Region::RightArm | Region::RightHand => Self::RightArm,
+            _ => Self::Trunk,
+        }
+    }
+}
+
+/// A half space: `normal` points out of the garment.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    point: Point3<f32>,
+    normal: Vector3<f32>,
+}
+
+impl Plane {
+    fn outside(&self, p: &Point3<f32>) -> f32 {
+        (p - self.point).dot(&self.normal)
+    }
+
+    fn mirrored(&self) -> Self {
+        let flip = Vector3::new(-1.0, 1.0, 1.0);
+        Self { point: Point3::from(self.point.coords.component_mul(&flip)), normal: self.normal.component_mul(&flip) }
+    }
+}
+
+/// Where a top ends around the neck: above a plane near the neck, and above a height everywhere.
+#[derive(Debug, Clone, Copy)]
+struct Neckline {
+    plane: Plane,
+    center: Point3<f32>,
+    radius: f32,
+    highest: f32,
+}
+
+impl Neckline {
+    /// The hole reaches farther to the front and back than to the shoulders.
+    const REACH: f32 = 0.6;
+
+    fn outside(&self, p: &Point3<f32>) -> f32 {
+        let from_axis = (p.x - self.center.x).hypot((p.z - self.center.z) * Self::REACH);
+        self.plane.outside(p).min(self.radius - from_axis).max(p.y - self.highest)
+    }
+}
+
+/// A garment's cut for one person at rest.
+#[derive(Debug, Clone)]
+pub struct Tailoring {
+    /// Trunk: upper and lower ends, each a plane.
+    ends: Vec<Plane>,
+    /// Around the neck, for tops.
+    neckline: Option<Neckline>,
+    /// Where the legs end (left and right), if the garment has legs.
+    legs: Option<[Plane; 2]>,
+    /// Where the sleeves end; without them the arms are left out.
+    sleeves: Option<[Plane; 2]>,
+    /// Half the width of the open front, metres, and the depth (z) in front of which it is cut.
+    opening: Option<(f32, f32)>,
+    /// Distance from what is below, metres.
+    pub ease: f32,
+    /// 0 follows the body, 1 hangs straight down from `drape_from`.
+    pub drape: f32,
+    /// Height that the cloth hangs down from, metres.
+    pub drape_from: f32,
+    /// Further ease a metre below `drape_from`.
+    pub flare: f32,
+    /// Depth of pleats at the lower end, metres.
+    pub pleats: f32,
+    /// Height of the lower end, metres.
+    pub lower_end: f32,
+    /// Highest crease, metres.
+    pub creases: f32,
+    /// Length of creases along x, y, z, metres.
+    pub crease_length: Vector3<f32>,
+}
+
+impl Tailoring {
+    /// Measures `person` for a garment; sizes vary a little with `random`.
+    pub fn new(kind: GarmentKind, model: &BodyModel, person: &Person, random: &mut Random) -> Self {
+        let measure = Measure { model, person };
+        let vary = random.range(-1.0, 1.0) as f32;
+        match kind {
+            GarmentKind::Trousers => measure.bottoms(0.93 + 0.01 * vary, 0.009, 0.10),
+            GarmentKind::Shorts => measure.bottoms(0.42 + 0.03 * vary, 0.011, 0.25),
+            GarmentKind::Skirt => measure.skirt(0.9 + 0.06 * vary),
+            GarmentKind::Tshirt => measure.top(0.30 + 0.02 * vary, 0.05, 0.010, 0.6),
+            GarmentKind::Blouse => measure.top(0.86 + 0.02 * vary, 0.03, 0.010, 0.6),
+            GarmentKind::Jumper => measure.top(0.92, 0.045, 0.013, 0.8),
+            GarmentKind::Jacket => measure.open_top(0.93, 0.07, 0.014),
+            GarmentKind::Coat => measure.coat(0.94),
+        }
+    }
+
+    /// How far a place lies outside the garment's extent, metres; negative inside. Beyond limits of the same limb the
+    /// value is exact near its zero.
+    pub fn outside(&self, p: &Point3<f32>, limb: Limb) -> f32 {
+        let arm = match limb {
+            Limb::Trunk => None,
+            Limb::LeftArm => Some(0),
+            Limb::RightArm => Some(1),
+        };
+        if let Some(side) = arm {
+            return self.sleeves.as_ref().map_or(FAR, |s| s[side].outside(p).clamp(-FAR, FAR));
+        }
+        let mut out = self.ends.iter().map(|end| end.outside(p)).fold(-FAR, f32::max);
+        if let Some(neckline) = &self.neckline {
+            out = out.max(neckline.outside(p));
+        }
+        if let Some(legs) = &self.legs {
+            out = out.max(legs[usize::from(p.x < 0.0)].outside(p));
+        }
+        if let Some((half_width, front)) = self.opening
+            && p.z > front
+        {
+            out = out.max(half_width - p.x.abs());
+        }
+        out.min(FAR)
+    }
+}
+
+/// A person being measured.
+struct Measure<'a> {
+    model: &'a BodyModel,
+    person: &'a Person,
+}
+
+impl Measure<'_> {
+    fn joint(&self, joint: Joint) -> Point3<f32> {
+        self.person.body.skeleton.position(joint).cast()
+    }
+
+    fn landmark(&self, name: &str) -> Point3<f32> {
+        self.model.landmark(name).map_or_else(Point3::origin, |v| self.person.body.mesh.positions[v as usize])
+    }
+
+    /// A plane across a limb of two bones at a share of its length, pointing outwards along it, and its mirror image.
+    fn across(&self, joints: [Joint; 3], share: f32) -> [Plane; 2] {
+        let [a, b, c] = joints.map(|j| self.joint(j));
+        let (upper, lower) = ((b - a).norm(), (c - b).norm());
+        let at = share * (upper + lower);
+        let (start, end, rest) = if at <= upper { (a, b, at) } else { (b, c, at - upper) };
+        let normal = (end - start).try_normalize(1e-6).unwrap_or(-Vector3::y());
+        let plane = Plane { point: start + normal * rest, normal };
+        [plane, plane.mirrored()]
+    }
+
+    fn legs(&self, share: f32) -> [Plane; 2] {
+        self.across([Joint::LeftUpperLeg, Joint::LeftLowerLeg, Joint::LeftFoot], share)
+    }
+
+    fn sleeves(&self, share: f32) -> [Plane; 2] {
+        self.across([Joint::LeftUpperArm, Joint::LeftLowerArm, Joint::LeftHand], share)
+    }
+
+    fn level(&self, y: f32, up: bool) -> Plane {
+        let normal = if up { Vector3::y() } else { -Vector3::y() };
+        Plane { point: Point3::new(0.0, y, 0.0), normal }
+    }
+
+    /// A little lower in front than behind, as waistbands sit.
+    fn waistband(&self) -> Plane {
+        let crotch = self.landmark("crotch").y;
+        let y = crotch + 0.88 * (self.landmark("navel").y - crotch);
+        let normal = Vector3::new(0.0, 1.0, 0.12).normalize();
+        Plane { point: Point3::new(0.0, y, 0.0), normal }
+    }
+
+    /// A neckline `drop` metres below the pit of the throat and `wide` metres from the neck's axis at the sides.
+    fn neckline(&self, drop: f32, wide: f32) -> Neckline {
+        let nape = self.landmark("cervicale");
+        let throat = self.landmark("suprasternale") - Vector3::new(0.0, drop, 0.0);
+        let along = (throat - nape).try_normalize(1e-6).unwrap_or(Vector3::z());
+        let plane = Plane { point: nape, normal: Vector3::new(0.0, along.z, -along.y) };
+        Neckline { plane, center: self.joint(Joint::Neck), radius: wide, highest: nape.y + 0.01 }
+    }
+
+    fn bottoms(&self, leg_share: f32, ease: f32, flare: f32) -> Tailoring {
+        let waist = self.waistband();
+        let knee = self.joint(Joint::LeftLowerLeg).y;
+        Tailoring {
+            ends: vec![waist],
+            neckline: None,
+            legs: Some(self.legs(leg_share)),
+            sleeves: None,
+            opening: None,
+            ease,
+            drape: 0.0,
+            drape_from: self.landmark("crotch").y,
+            flare: flare * 0.12,
+            pleats: 0.0,
+            lower_end: knee,
+            creases: 0.005,
+            crease_length: Vector3::new(0.09, 0.06, 0.09),
+        }
+    }
+
+    fn skirt(&self, thigh_share: f32) -> Tailoring {
+        let waist = self.waistband();
+        let (hip, knee) = (self.joint(Joint::LeftUpperLeg).y, self.joint(Joint::LeftLowerLeg).y);
+        let lower_end = hip + thigh_share * (knee - hip);
+        Tailoring {
+            ends: vec![waist, self.level(lower_end, false)],
+            neckline: None,
+            legs: None,
+            sleeves: None,
+            opening: None,
+            ease: 0.008,
+            drape: 1.0,
+            drape_from: waist.point.y,
+            flare: 0.07,
+            pleats: 0.014,
+            lower_end,
+            creases: 0.003,
+            crease_length: Vector3::new(0.08, 0.2, 0.08),
+        }
+    }
+
+    /// A closed top whose sleeves cover `sleeve_share` of the arm and which ends `below` metres under the hip joints.
+    fn top(&self, sleeve_share: f32, below: f32, ease: f32, drape: f32) -> Tailoring {
+        let hip = self.joint(Joint::LeftUpperLeg).y;
+        let lower_end = hip + 0.05 - below;
+        Tailoring {
+            ends: vec![self.level(lower_end, false)],
+            neckline: Some(self.neckline(0.0, 0.085)),
+            legs: None,
+            sleeves: Some(self.sleeves(sleeve_share)),
+            opening: None,
+            ease,
+            drape,
+            drape_from: self.landmark("leftNipple").y,
+            flare: 0.02,
+            pleats: 0.0,
+            lower_end,
+            creases: 0.006,
+            crease_length: Vector3::new(0.10, 0.07, 0.10),
+        }
+    }
+
+    fn open_top(&self, sleeve_share: f32, below: f32, ease: f32) -> Tailoring {
+        let front = self.joint(Joint::Chest).z;
+        let closed = self.top(sleeve_share, below, ease, 0.9);
+        Tailoring { neckline: Some(self.neckline(0.03, 0.095)), opening: Some((0.05, front)), ..closed }
+    }
+
+    fn coat(&self, sleeve_share: f32) -> Tailoring {
+        let (hip, knee) = (self.joint(Joint::LeftUpperLeg).y, self.joint(Joint::LeftLowerLeg).y);
+        let lower_end = knee + 0.15 * (hip - knee);
+        let jacket = self.open_top(sleeve_share, 0.0, 0.015);
+        let ends = vec![self.level(lower_end, false)];
+        Tailoring { ends, drape: 1.0, flare: 0.05, lower_end, opening: Some((0.03, 0.0)), ..jacket }
+    }
+}

@@ -1,0 +1,106 @@
+//! Stature and girths by the tape's rule: convex-hull perimeters of the torso's sections.
+
+use nalgebra::Point2;
+use serde::Serialize;
+use toile_character::Region;
+use toile_geometry::Mesh;
+
+/// Distance between two sections that are tried, as a share of stature.
+const STEP: f64 = 0.001;
+
+/// A girth and where it was taken.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Girth {
+    /// Height over the soles, metres.
+    pub height_m: f64,
+    /// Length of the tape, metres.
+    pub girth_m: f64,
+}
+
+/// The three girths that subjects are described by.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Girths {
+    /// The largest at 70–73.5 % of stature.
+    pub chest: Girth,
+    /// The least at 57–66 %.
+    pub waist: Girth,
+    /// The largest at 47–55 %.
+    pub hip: Girth,
+}
+
+/// Height of a standing body, metres.
+pub fn stature(body: &Mesh) -> f64 {
+    body.bounds().map_or(0.0, |(lo, hi)| f64::from(hi.y - lo.y))
+}
+
+/// Girths of a body standing on y = 0, arms excluded; `None` where a section is empty.
+pub fn girths(body: &Mesh, regions: &[Region]) -> Option<Girths> {
+    use Region::*;
+    let height = stature(body);
+    let trunk = |v: &u32| matches!(regions[*v as usize], Torso | LeftLeg | RightLeg);
+    let (body, _) = body.filter_triangles(|t| body.triangles[t].iter().all(trunk));
+    let scan = |low: f64, high: f64, sign: f64| {
+        let steps = ((high - low) / STEP).round() as usize;
+        let sections = (0..=steps).map(|i| (low + STEP * i as f64) * height);
+        let taken = sections.filter_map(|y| Some(Girth { height_m: y, girth_m: girth_at(&body, y)? }));
+        taken.max_by(|a, b| (sign * a.girth_m).total_cmp(&(sign * b.girth_m)))
+    };
+    Some(Girths { chest: scan(0.70, 0.735, 1.0)?, waist: scan(0.57, 0.66, -1.0)?, hip: scan(0.47, 0.55, 1.0)? })
+}
+
+/// Perimeter of the convex hull of the section at height `y`.
+fn girth_at(body: &Mesh, y: f64) -> Option<f64> {
+    let mut points = Vec::new();
+    for t in &body.triangles {
+        let corners = t.map(|v| body.positions[v as usize].cast::<f64>());
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            if (a.y < y) != (b.y < y) {
+                let f = (y - a.y) / (b.y - a.y);
+                points.push(Point2::new(a.x + f * (b.x - a.x), a.z + f * (b.z - a.z)));
+            }
+        }
+    }
+    let hull = convex_hull(&mut points);
+    let sides = hull.iter().zip(hull.iter().cycle().skip(1));
+    (hull.len() > 2).then(|| sides.map(|(a, b)| (b - a).norm()).sum())
+}
+
+/// Convex hull, counter-clockwise (Andrew 1979). Sorts `points`.
+pub fn convex_hull(points: &mut Vec<Point2<f64>>) -> Vec<Point2<f64>> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    let turn = |a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>| (b - a).perp(&(c - a));
+    let chain = |ordered: &mut dyn Iterator<Item = &Point2<f64>>| {
+        let mut chain: Vec<Point2<f64>> = Vec::new();
+        for p in ordered {
+            while chain.len() > 1 && turn(&chain[chain.len() - 2], &chain[chain.len() - 1], p) <= 0.0 {
+                chain.pop();
+            }
+            chain.push(*p);
+        }
+        chain.pop();
+        chain
+    };
+    let mut hull = chain(&mut points.iter());
+    hull.extend(chain(&mut points.iter().rev()));
+    hull
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hull_of_a_star_is_its_outline() {
+        let star = |i: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * i as f64 / 16.0).sin_cos();
+            let r = if i % 2 == 0 { 2.0 } else { 0.7 };
+            Point2::new(r * cos, r * sin)
+        };
+        let hull = convex_hull(&mut (0..16).map(star).collect());
+        assert_eq!(hull.len(), 8);
+        let length: f64 = hull.iter().zip(hull.iter().cycle().skip(1)).map(|(a, b)| (b - a).norm()).sum();
+        assert!((length - 8.0 * 4.0 * (std::f64::consts::PI / 8.0).sin()).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,163 @@
+//! What is true of a take, in the files that the scoring scripts read.
+
+use std::path::Path;
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+use toile_capture::atomic_write;
+use toile_character::joint::JOINTS;
+use toile_geometry::{Mesh, ply};
+use toile_render::{Camera, rasterize};
+
+use crate::{
+    SyntheticError,
+    subject::Subject,
+    take::{Surface, Take},
+};
+
+/// A triangle counts as seen when it is no more than this behind the depth of its pixel, metres.
+const BEHIND: f32 = 0.004;
+/// Least cosine between ray and normal of a triangle that counts as seen.
+const GRAZING: f32 = 0.08;
+
+/// For each triangle of the take's surface, whether any frame of the take sees it.
+pub fn visible(take: &Take) -> Vec<bool> {
+    let mesh = &take.surface.mesh;
+    let normals = mesh.triangle_normals();
+    let mut seen = vec![false; mesh.triangles.len()];
+    for (index, moment) in take.moments.iter().enumerate() {
+        let bent = Mesh::new(take.bend.apply(&mesh.positions, moment), mesh.triangles.clone());
+        let camera_from_world = take.subject_from_camera(index).inverse();
+        let camera = Camera { lens: take.camera(), camera_from_world };
+        let depth = rasterize(&bent, &camera).depth;
+        seen.par_iter_mut().enumerate().filter(|(_, seen)| !**seen).for_each(|(t, seen)| {
+            *seen = is_seen(&bent, t, &normals[t], &camera, &depth);
+        });
+    }
+    seen
+}
+
+fn is_seen(mesh: &Mesh, t: usize, normal: &Vector3<f32>, camera: &Camera, depth: &[f32]) -> bool {
+    let [a, b, c] = mesh.corners(t);
+    let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+    let p = camera.camera_from_world * middle.cast::<f64>();
+    let ray = camera.camera_from_world.inverse_transform_vector(&p.coords).cast::<f32>();
+    if -ray.dot(normal) < GRAZING * ray.norm() {
+        return false;
+    }
+    let Some(pixel) = camera.lens.project(&p) else { return false };
+    let (u, v) = (pixel.x.round(), pixel.y.round());
+    if u < 0.0 || v < 0.0 || u >= f64::from(camera.lens.width) || v >= f64::from(camera.lens.height) {
+        return false;
+    }
+    let z = depth[v as usize * camera.lens.width as usize + u as usize];
+    z > 0.0 && p.z as f32 <= z + BEHIND
+}
+
+/// Writes a take's truth into `folder`: surface.ply, body.ply or garment_n.ply, poses.txt, pose.json, sway.txt.
+///
+/// # Errors
+/// [`SyntheticError::Capture`] names the file that could not be written.
+pub fn write(take: &Take, folder: &Path) -> Result<(), SyntheticError> {
+    let visible = visible(take);
+    let put = |name: &str, bytes: &[u8]| atomic_write(&folder.join(name), bytes);
+    put("surface.ply", &encode_surface(&take.surface, &visible, take.index > 0))?;
+    if take.index == 0 {
+        put("body.ply", &ply::encode(&take.body))?;
+    } else {
+        let garment = |t: usize| usize::from(take.surface.layer[t]) == take.index;
+        let plain = Mesh { normals: Vec::new(), ..take.surface.mesh.clone() };
+        put(&format!("garment_{}.ply", take.index), &ply::encode(&plain.filter_triangles(garment).0))?;
+    }
+    put("poses.txt", poses_text(take).as_bytes())?;
+    put("pose.json", pose_json(take).to_string().as_bytes())?;
+    if take.moments.iter().any(|m| m.pitch != 0.0 || m.breath != 0.0) {
+        put("sway.txt", sway_text(take).as_bytes())?;
+    }
+    Ok(())
+}
+
+/// The surface as PLY with colours, the vertices in take 0's pose, and per face layer, region and visibility.
+fn encode_surface(surface: &Surface, visible: &[bool], with_take_0: bool) -> Vec<u8> {
+    let mesh = &surface.mesh;
+    let mut header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", mesh.positions.len());
+    ["x", "y", "z"].iter().for_each(|n| header.push_str(&format!("property float {n}\n")));
+    ["red", "green", "blue"].iter().for_each(|n| header.push_str(&format!("property uchar {n}\n")));
+    if with_take_0 {
+        ["x0", "y0", "z0"].iter().for_each(|n| header.push_str(&format!("property float {n}\n")));
+    }
+    header.push_str(&format!("element face {}\nproperty list uchar int vertex_indices\n", mesh.triangles.len()));
+    ["layer", "region", "visible"].iter().for_each(|n| header.push_str(&format!("property uchar {n}\n")));
+    header.push_str("end_header\n");
+    let mut out = header.into_bytes();
+    for (v, p) in mesh.positions.iter().enumerate() {
+        p.iter().for_each(|c| out.extend(c.to_le_bytes()));
+        out.extend(mesh.colors[v]);
+        if with_take_0 {
+            surface.in_take_0[v].iter().for_each(|c| out.extend(c.to_le_bytes()));
+        }
+    }
+    for (t, corners) in mesh.triangles.iter().enumerate() {
+        out.push(3);
+        corners.iter().for_each(|&v| out.extend((v as i32).to_le_bytes()));
+        out.extend([surface.layer[t], surface.region[t], u8::from(visible[t])]);
+    }
+    out
+}
+
+fn poses_text(take: &Take) -> String {
+    let mut text = String::from(
+        "# timestamp tx ty tz qx qy qz qw = subject_from_camera (metres; subject: y up, origin on the disk's axis at its top)\n",
+    );
+    for (index, moment) in take.moments.iter().enumerate() {
+        let pose = take.subject_from_camera(index);
+        let (t, q) = (pose.translation.vector, pose.rotation.coords);
+        text.push_str(&format!(
+            "{:.9} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9}\n",
+            moment.time_ns as f64 * 1e-9,
+            t.x,
+            t.y,
+            t.z,
+            q.x,
+            q.y,
+            q.z,
+            q.w
+        ));
+    }
+    text
+}
+
+fn pose_json(take: &Take) -> Value {
+    let joints = take.joint_positions();
+    let named: serde_json::Map<String, Value> =
+        JOINTS.iter().map(|j| (j.name().to_string(), json!(joints[j.index()].coords.as_slice()))).collect();
+    let height = take.body.bounds().map_or(0.0, |(lo, hi)| hi.y - lo.y);
+    json!({ "take": take.name, "joints": named, "posed_height_m": height })
+}
+
+fn sway_text(take: &Take) -> String {
+    let mut text = String::from("# torso pitch deg, torso roll deg, breathing mm, per frame, about the true surface\n");
+    for m in &take.moments {
+        let row = format!("{:.5} {:.5} {:.5}\n", m.pitch.to_degrees(), m.roll.to_degrees(), m.breath * 1e3);
+        text.push_str(&row);
+    }
+    text
+}
+
+/// What is true of the person: stature, girths, takes.
+pub fn subject_json(subject: &Subject) -> Value {
+    let takes: Vec<String> = (0..subject.take_count()).map(|n| subject.settings.take_name(n)).collect();
+    let volume = subject.person.body.mesh.signed_volume() * 1e3;
+    json!({
+        "name": subject.settings.name,
+        "seed": subject.settings.seed,
+        "sway": subject.settings.sway_degrees > 0.0,
+        "takes": takes,
+        "stature_m": subject.person.stature_m,
+        "volume_l": volume,
+        "girths": subject.person.girths,
+        "beta": subject.person.beta,
+        "settings": subject.settings,
+    })
+}
