@@ -1,1 +1,41 @@
 //! The next garment layer from the next scan: labels, cut, un-pose, stack without penetration.
+//!
+//! Input of one take: the new scan, what was worn before (posed into it), and the body (posed into it). The way:
+//!
+//! 1. [`evidence`]: how far each scan vertex stands off what was worn before, how its colour differs, and where on
+//!    the body it lies;
+//! 2. [`labels`]: new garment or not, one energy over the scan's surface, minimised globally by a graph cut;
+//! 3. [`cut`] and [`clean`]: the garment's own mesh, cut through triangles along a smooth hem, islands dropped, holes
+//!    closed;
+//! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
+//! 5. [`stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests.
+//!
+//! [`extract`](extract::extract) runs 1 to 4 for one take; [`stack`](stack::stack) runs 5 over all layers.
+//!
+//! ```
+//! use toile_garments::GarmentType;
+//! assert_eq!("trousers".parse(), Ok(GarmentType::Trousers));
+//! ```
+
+pub mod body_parts;
+pub mod clean;
+pub mod color;
+pub mod common_frame;
+pub mod cut;
+pub mod error;
+pub mod evidence;
+pub mod extract;
+pub mod garment_type;
+pub mod labels;
+pub mod lower_surface;
+pub mod push;
+pub mod scan_graph;
+pub mod settings;
+pub mod stack;
+pub mod surface_solve;
+
+pub use error::GarmentError;
+pub use extract::{Extraction, Take, Warning, extract};
+pub use garment_type::GarmentType;
+pub use settings::{ExtractSettings, StackSettings};
+pub use stack::{LayerReport, StackReport, stack};

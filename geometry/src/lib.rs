@@ -24,13 +24,19 @@
 
 pub mod bvh;
 pub mod camera;
+pub mod components;
+pub mod decimate;
 pub mod error;
+pub mod holes;
 pub mod intersection;
 pub mod max_flow;
 pub mod mesh;
 pub mod obj;
 pub mod ply;
+pub mod polygon;
 pub mod predicates;
+pub mod remesh;
+pub mod smooth;
 pub mod topology;
 pub mod triangle;
 

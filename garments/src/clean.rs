@@ -1,0 +1,155 @@
+//! Islands dropped, holes closed.
+
+use nalgebra::Point3;
+use toile_geometry::{
+    Mesh,
+    topology::{boundary_loops, loop_length, vertex_components},
+    triangle::ray_hit,
+};
+
+use crate::{ExtractSettings, labels::Labels, scan_graph::ScanGraph};
+
+/// An island of old surface inside the garment is turned new up to this share of `least_area`, whatever it says.
+const ISLAND_SHARE: f32 = 0.2;
+/// Loops with more vertices than this are not closed: triangulating costs the cube.
+const MOST_RIM_VERTICES: usize = 160;
+
+/// Labels with small islands of either kind turned over, and of the garment's pieces only the large ones kept.
+/// Returns how many pieces are left.
+pub fn drop_islands(graph: &ScanGraph, labels: &mut Labels, settings: &ExtractSettings) -> usize {
+    let (set, areas) = graph.components(|v| !labels.garment[v]);
+    for v in 0..graph.len() {
+        if set[v] != u32::MAX && areas[set[v] as usize] < ISLAND_SHARE * settings.least_area {
+            flip(labels, v);
+        }
+    }
+    let (set, areas) = graph.components(|v| labels.garment[v]);
+    let largest = areas.iter().copied().fold(0.0, f32::max);
+    let keep = |a: f32| a >= settings.least_area && a >= settings.piece_share * largest;
+    for v in 0..graph.len() {
+        if set[v] != u32::MAX && !keep(areas[set[v] as usize]) {
+            flip(labels, v);
+        }
+    }
+    areas.iter().filter(|&&a| keep(a)).count()
+}
+
+fn flip(labels: &mut Labels, v: usize) {
+    labels.garment[v] = !labels.garment[v];
+    labels.confidence[v] = 0.5;
+}
+
+/// The mesh without pieces smaller than `share` of its largest one (by area).
+pub fn keep_large_pieces(mesh: &Mesh, share: f32) -> Mesh {
+    let (set, count) = vertex_components(mesh.positions.len(), &mesh.triangles);
+    let mut areas = vec![0.0f32; count];
+    for (t, tri) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(t);
+        areas[set[tri[0] as usize] as usize] += 0.5 * (b - a).cross(&(c - a)).norm();
+    }
+    let largest = areas.iter().copied().fold(0.0, f32::max);
+    mesh.filter_triangles(|t| areas[set[mesh.triangles[t][0] as usize] as usize] >= share * largest).0
+}
+
+/// Closes boundary loops up to `longest` (metres) unless one of `bones` passes through them. New triangles are few;
+/// remeshing refines them. Marks the rims of closed holes in the attribute `filled` and returns how many were closed.
+pub fn fill_holes(mesh: &mut Mesh, bones: &[[Point3<f32>; 2]], longest: f32) -> usize {
+    let mut closed = 0;
+    for rim in boundary_loops(&mesh.triangles) {
+        let short = rim.len() >= 3 && rim.len() <= MOST_RIM_VERTICES && loop_length(&mesh.positions, &rim) <= longest;
+        if !short || bones.iter().any(|b| passes(&mesh.positions, &rim, b)) {
+            continue;
+        }
+        // The loop runs along the surface's triangles; the filling runs against it.
+        let against: Vec<u32> = rim.iter().rev().copied().collect();
+        mesh.triangles.extend(triangulate(&mesh.positions, &against));
+        let count = mesh.positions.len();
+        let filled = mesh.attributes.entry("filled".into()).or_insert_with(|| vec![0.0; count]);
+        rim.iter().for_each(|&v| filled[v as usize] = 1.0);
+        closed += 1;
+    }
+    closed
+}
+
+/// True where the segment goes through the fan from the loop's centre.
+fn passes(positions: &[Point3<f32>], rim: &[u32], [from, to]: &[Point3<f32>; 2]) -> bool {
+    let sum = rim.iter().fold(nalgebra::Vector3::zeros(), |s, &v| s + positions[v as usize].coords);
+    let center = Point3::from(sum / rim.len() as f32);
+    (0..rim.len()).any(|i| {
+        let (a, b) = (positions[rim[i] as usize], positions[rim[(i + 1) % rim.len()] as usize]);
+        ray_hit(from, &(to - from), &[center, a, b]).is_some_and(|(t, _)| t <= 1.0)
+    })
+}
+
+/// Triangulation of least area of a closed polygon in space (Barequet and Sharir 1995). O(n³).
+fn triangulate(positions: &[Point3<f32>], polygon: &[u32]) -> Vec<[u32; 3]> {
+    let n = polygon.len();
+    let p = |i: usize| positions[polygon[i] as usize];
+    let area = |i: usize, j: usize, k: usize| (p(j) - p(i)).cross(&(p(k) - p(i))).norm();
+    let mut cost = vec![0.0f32; n * n];
+    let mut split = vec![0usize; n * n];
+    for width in 2..n {
+        for i in 0..n - width {
+            let k = i + width;
+            let (best, at) = (i + 1..k)
+                .map(|j| (cost[i * n + j] + cost[j * n + k] + area(i, j, k), j))
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+                .unwrap_or((0.0, i + 1));
+            (cost[i * n + k], split[i * n + k]) = (best, at);
+        }
+    }
+    let mut triangles = Vec::with_capacity(n - 2);
+    let mut stack = vec![(0, n - 1)];
+    while let Some((i, k)) = stack.pop() {
+        if k - i < 2 {
+            continue;
+        }
+        let j = split[i * n + k];
+        triangles.push([polygon[i], polygon[j], polygon[k]]);
+        stack.extend([(i, j), (j, k)]);
+    }
+    triangles
+}
+
+#[cfg(test)]
+mod tests {
+    use toile_geometry::topology::Edges;
+
+    use super::*;
+
+    fn tube_end() -> Mesh {
+        let n = 12u32;
+        let ring = |y: f32| {
+            (0..n).map(move |i| {
+                let a = i as f32 / n as f32 * std::f32::consts::TAU;
+                Point3::new(0.03 * a.sin(), y, 0.03 * a.cos())
+            })
+        };
+        let positions = ring(0.0).chain(ring(0.1)).collect();
+        let triangles = (0..n)
+            .flat_map(|i| {
+                let j = (i + 1) % n;
+                [[i, j, n + i], [j, n + j, n + i]]
+            })
+            .collect();
+        Mesh::new(positions, triangles)
+    }
+
+    #[test]
+    fn holes_are_closed_but_not_where_a_limb_passes() {
+        let mut mesh = tube_end();
+        let bone = [Point3::new(0.0, -0.2, 0.0), Point3::new(0.0, 0.05, 0.0)];
+        assert_eq!(fill_holes(&mut mesh, &[bone], 0.3), 1);
+        assert_eq!(boundary_loops(&mesh.triangles).len(), 1);
+        assert_eq!(fill_holes(&mut mesh, &[], 0.3), 1);
+        assert!(Edges::new(&mesh.triangles).is_closed());
+        let volume = mesh.signed_volume();
+        assert!((volume - 0.1 * 12.0 * 0.5 * 0.0009 * 0.5).abs() < 1e-5, "{volume}");
+    }
+
+    #[test]
+    fn long_rims_stay_open() {
+        let mut mesh = tube_end();
+        assert_eq!(fill_holes(&mut mesh, &[], 0.1), 0);
+    }
+}

@@ -1,0 +1,82 @@
+//! From a take's pose to the common frame: weights carried from the body, un-posed and posed again.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use toile_character::{SkinWeights, joint::JOINT_COUNT, skinning};
+use toile_geometry::{Mesh, bvh::Bvh};
+
+use crate::{ExtractSettings, Take, surface_solve::SurfaceSystem};
+
+/// Weights are smoothed over at least this length, metres: the body's own triangles are no finer.
+const LEAST_SMOOTHING: f32 = 0.01;
+/// Cloth at distance d from the body shares its weights with what lies within this many times d.
+const SMOOTHING_PER_DISTANCE: f32 = 1.5;
+
+/// Skin weights of a garment in a take: those of the closest body triangle that faces the same way (seed §5.2), then
+/// spread over the garment the further the looser it hangs, so that a skirt does not tear between the legs.
+pub fn weights(take: &Take, garment: &Mesh, settings: &ExtractSettings) -> SkinWeights {
+    if garment.is_empty() {
+        return SkinWeights::default();
+    }
+    let (mut closest, distances) = closest_weights(take, garment);
+    let lengths: Vec<f32> = distances
+        .iter()
+        .map(|&d| LEAST_SMOOTHING.max(SMOOTHING_PER_DISTANCE * d * (d / settings.loose_distance.max(1e-4)).min(1.0)))
+        .collect();
+    let system = SurfaceSystem::new(garment);
+    let anchors: Vec<f32> = lengths.iter().map(|l| 1.0 / (l * l)).collect();
+    let used: Vec<usize> = (0..JOINT_COUNT).filter(|&j| closest.iter().any(|row| row[j] > 0.0)).collect();
+    let columns: Vec<(usize, Vec<f32>)> = used
+        .into_par_iter()
+        .map(|j| {
+            let column: Vec<f32> = closest.iter().map(|row| row[j]).collect();
+            (j, system.smoothed(&column, &anchors))
+        })
+        .collect();
+    for (j, column) in columns {
+        closest.iter_mut().zip(column).for_each(|(row, w)| row[j] = w);
+    }
+    let mut out = SkinWeights::default();
+    for row in closest {
+        let influences: Vec<(u8, f32)> = row.iter().enumerate().map(|(j, &w)| (j as u8, w)).collect();
+        out.push(&influences);
+    }
+    out
+}
+
+/// Dense weights of the closest compatible body triangle, and the distance to it.
+fn closest_weights(take: &Take, garment: &Mesh) -> (Vec<[f32; JOINT_COUNT]>, Vec<f32>) {
+    let bvh = Bvh::new(&take.body.positions, &take.body.triangles);
+    let normals = take.body.triangle_normals();
+    let own = garment.vertex_normals();
+    garment
+        .positions
+        .par_iter()
+        .zip(&own)
+        .map(|(p, n)| {
+            let mut row = [0.0; JOINT_COUNT];
+            let facing = |t: u32| facing(&normals[t as usize], n);
+            let Some(hit) = bvh.closest_where(p, f32::INFINITY, facing).or_else(|| bvh.closest(p, f32::INFINITY))
+            else {
+                return (row, 0.0);
+            };
+            for (v, b) in take.body.triangles[hit.triangle as usize].into_iter().zip(hit.barycentric) {
+                take.weights.of(v as usize).for_each(|(j, w)| row[j as usize] += w * b);
+            }
+            (row, hit.distance)
+        })
+        .unzip()
+}
+
+fn facing(body: &Vector3<f32>, garment: &Vector3<f32>) -> bool {
+    body.dot(garment) > 0.0
+}
+
+/// The garment's vertices un-posed from the take's pose and posed as in take 0 (Hu et al. 2017, §6.3).
+pub fn to_common_frame(take: &Take, garment: &Mesh, weights: &SkinWeights) -> Mesh {
+    let rest = skinning::unskin(&garment.positions, weights, &take.pose.skinning_transforms(take.skeleton));
+    let mut common = garment.clone();
+    common.positions = skinning::skin(&rest, weights, &take.pose0.skinning_transforms(take.skeleton));
+    common.recompute_normals();
+    common
+}

@@ -1,0 +1,309 @@
+//! One take's garment, from the scan to the common frame.
+
+use nalgebra::{Point3, Vector3};
+use serde::Serialize;
+use toile_character::{Joint, Pose, SkinWeights, Skeleton, joint::JOINTS};
+use toile_geometry::{
+    Mesh,
+    bvh::Bvh,
+    topology::{boundary_loops, loop_length},
+};
+
+use crate::{
+    ExtractSettings, GarmentError, GarmentType,
+    body_parts::{BodyPart, PART_COUNT, part_of},
+    clean, common_frame, cut,
+    evidence::{self, Evidence},
+    labels::{self, Labels},
+    scan_graph::ScanGraph,
+};
+
+/// Boundary loops at least this long are openings of the garment, metres; shorter ones are small holes.
+const OPENING: f32 = 0.15;
+/// Scan this far inside what was worn before means that something is missing, metres.
+const SUNKEN: f32 = 0.012;
+/// So much sunken area makes a warning, square metres.
+const SUNKEN_AREA: f32 = 0.03;
+/// Labels less sure than this are marked as unsure.
+const UNSURE: f32 = 0.7;
+
+/// What is known of a take before its garment is taken out. All meshes are in the scan's frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Take<'a> {
+    /// The new scan, with colours and the attribute `filled`.
+    pub scan: &'a Mesh,
+    /// What was worn before (the scan of the take before), posed into this scan, with colours.
+    pub previous: &'a Mesh,
+    /// The body posed into this scan, on the template's triangles.
+    pub body: &'a Mesh,
+    /// Skin weights of the body.
+    pub weights: &'a SkinWeights,
+    /// The body's rest skeleton.
+    pub skeleton: &'a Skeleton,
+    /// The body's pose in this take, relative to rest.
+    pub pose: &'a Pose,
+    /// The body's pose in take 0: the common frame.
+    pub pose0: &'a Pose,
+    /// The garment's type where it was told.
+    pub garment_type: Option<GarmentType>,
+}
+
+/// What an operator should know about a layer.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Warning {
+    /// Nothing new is worn in this take.
+    NothingNew,
+    /// Scan areas lie well inside what was worn before: something was taken off, or pressed in; square metres.
+    TakenOff(f32),
+    /// The garment is in this many separate large pieces on different parts of the body: two were put on at once?
+    SeveralPieces(usize),
+}
+
+impl std::fmt::Display for Warning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NothingNew => write!(f, "no new garment was found in this take: was one put on before it?"),
+            Self::TakenOff(area) => write!(
+                f,
+                "{:.0} cm² of the scan lie inside what was worn before: was something taken off?",
+                area * 1e4
+            ),
+            Self::SeveralPieces(n) => {
+                write!(f, "the garment has {n} separate pieces: were two put on at once? They are kept as one layer")
+            }
+        }
+    }
+}
+
+/// A take's garment and how it was found.
+#[derive(Debug, Clone)]
+pub struct Extraction {
+    /// Labels of the scan's vertices.
+    pub labels: Labels,
+    /// The garment in the take's pose and frame; attributes `confidence`, `filled`. Empty where nothing new was found.
+    pub in_take: Mesh,
+    /// The same vertices in the common frame: take 0's pose.
+    pub garment: Mesh,
+    /// Skin weights of the garment's vertices.
+    pub weights: SkinWeights,
+    /// What was decided.
+    pub report: ExtractionReport,
+    /// What to worry about.
+    pub warnings: Vec<Warning>,
+}
+
+/// What the extraction decided, for the layer's report.
+#[derive(Debug, Clone, Serialize)]
+pub struct ExtractionReport {
+    /// Told or guessed type.
+    pub garment_type: GarmentType,
+    /// True where the type was guessed.
+    pub type_guessed: bool,
+    /// Area of the garment, square metres.
+    pub area_m2: f64,
+    /// Share of the garment's vertices whose label is unsure.
+    pub unsure_share: f32,
+    /// Share of the garment's vertices that nobody saw.
+    pub filled_share: f32,
+    /// Lengths of the openings, longest first, metres.
+    pub openings_m: Vec<f32>,
+    /// Scale of heights over what was worn before where nothing is new, metres.
+    pub height_noise_m: f32,
+    /// Scale of colour differences where nothing is new.
+    pub color_noise: f32,
+    /// Separate pieces.
+    pub pieces: usize,
+}
+
+/// Finds the new garment of a take, cuts it out and brings it to the common frame.
+///
+/// # Errors
+/// [`GarmentError`] where a mesh is empty, broken, or does not go with its weights. A take without a new garment is a
+/// result with [`Warning::NothingNew`] and empty meshes.
+pub fn extract(
+    take: &Take,
+    settings: &ExtractSettings,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Extraction, GarmentError> {
+    check(take)?;
+    let graph = ScanGraph::new(take.scan);
+    let evidence = evidence::measure(take, &graph, settings);
+    progress(0.3);
+    let (garment_type, mut labels) = label(take, &graph, &evidence, settings);
+    let pieces = clean::drop_islands(&graph, &mut labels, settings);
+    progress(0.6);
+    let in_take = garment_mesh(take, &graph, &labels, settings);
+    progress(0.8);
+    let weights = common_frame::weights(take, &in_take, settings);
+    let garment = common_frame::to_common_frame(take, &in_take, &weights);
+    let warnings = warnings(&graph, &evidence, &in_take, pieces);
+    let report = report(take, &in_take, &evidence, garment_type, pieces);
+    progress(1.0);
+    Ok(Extraction { labels, in_take, garment, weights, report, warnings })
+}
+
+fn check(take: &Take) -> Result<(), GarmentError> {
+    for (mesh, name) in [(take.scan, "scan"), (take.previous, "earlier layers' surface"), (take.body, "body")] {
+        if mesh.is_empty() {
+            return Err(GarmentError::Empty(name));
+        }
+        mesh.validate().map_err(|e| GarmentError::Mesh(format!("the {name}: {e}")))?;
+    }
+    let (vertices, weights) = (take.body.positions.len(), take.weights.len());
+    if vertices != weights {
+        return Err(GarmentError::Mismatch(format!("the body has {vertices} vertices but weights for {weights}")));
+    }
+    Ok(())
+}
+
+/// Labels with the told type's template, or first with none, then with that of the guessed type.
+fn label(take: &Take, graph: &ScanGraph, evidence: &Evidence, settings: &ExtractSettings) -> (GarmentType, Labels) {
+    if let Some(told) = take.garment_type {
+        return (told, labels::label(graph, evidence, told, None, settings));
+    }
+    let free = labels::label(graph, evidence, GarmentType::Other, None, settings);
+    let guess = guess_type(take, graph, evidence, &free);
+    if guess == GarmentType::Other {
+        return (guess, free);
+    }
+    (guess, labels::label(graph, evidence, guess, Some(&free), settings))
+}
+
+/// Type from what is covered, what hangs between the legs and whether the front is open.
+fn guess_type(take: &Take, graph: &ScanGraph, evidence: &Evidence, labels: &Labels) -> GarmentType {
+    let (mut covered, mut all) = ([0.0f32; PART_COUNT], [1e-6f32; PART_COUNT]);
+    for v in 0..graph.len() {
+        for (k, share) in evidence.parts[v].iter().enumerate() {
+            all[k] += share * graph.areas[v];
+            covered[k] += if labels.garment[v] { share * graph.areas[v] } else { 0.0 };
+        }
+    }
+    let shares = std::array::from_fn(|k| covered[k] / all[k]);
+    let (hanging, open) = (hanging_share(take), front_is_open(take, labels));
+    GarmentType::guess(&shares, hanging, open)
+}
+
+/// Share of the inner thighs that no scan surface follows: cloth hangs around both legs there.
+fn hanging_share(take: &Take) -> f32 {
+    let joints = take.pose.joint_positions(take.skeleton);
+    let across = joints[Joint::RightUpperLeg.index()] - joints[Joint::LeftUpperLeg.index()];
+    let across = across.cast::<f32>().try_normalize(1e-6).unwrap_or(-Vector3::x());
+    let bvh = Bvh::new(&take.scan.positions, &take.scan.triangles);
+    let normals = take.scan.triangle_normals();
+    let body_normals = take.body.vertex_normals();
+    let (mut bare, mut inner) = (0, 0);
+    for v in 0..take.body.positions.len() {
+        let side = match JOINTS.get(take.weights.joints[v][0] as usize) {
+            Some(Joint::LeftUpperLeg) => 1.0,
+            Some(Joint::RightUpperLeg) => -1.0,
+            _ => continue,
+        };
+        let n = body_normals[v];
+        if n.dot(&across) * side > 0.6 {
+            inner += 1;
+            let follows = |t: u32| normals[t as usize].dot(&n) > 0.3;
+            bare += usize::from(bvh.closest_where(&take.body.positions[v], 0.06, follows).is_none());
+        }
+    }
+    bare as f32 / inner.max(1) as f32
+}
+
+/// True where the middle of the back is covered much more than the middle of the front.
+fn front_is_open(take: &Take, labels: &Labels) -> bool {
+    let frame = take.pose.joint_frames(take.skeleton)[Joint::Chest.index()].cast::<f32>();
+    let (mut front, mut back) = ([0.0f32; 2], [0.0f32; 2]);
+    let body = Bvh::new(&take.body.positions, &take.body.triangles);
+    let normals = take.body.triangle_normals();
+    for (v, p) in take.scan.positions.iter().enumerate() {
+        let local = frame.inverse_transform_point(p);
+        if local.x.abs() > 0.04 {
+            continue;
+        }
+        let Some(hit) = body.closest(p, 0.1) else { continue };
+        let joint = take.weights.joints[take.body.triangles[hit.triangle as usize][0] as usize][0];
+        if JOINTS.get(joint as usize).is_none_or(|&j| part_of(j) != BodyPart::Torso) {
+            continue;
+        }
+        let facing = (frame.rotation.inverse() * normals[hit.triangle as usize]).z;
+        let side = if facing > 0.5 { &mut front } else { &mut back };
+        if facing.abs() > 0.5 {
+            side[0] += f32::from(u8::from(labels.garment[v]));
+            side[1] += 1.0;
+        }
+    }
+    let share = |s: [f32; 2]| s[0] / s[1].max(1.0);
+    share(back) > 0.6 && share(front) < 0.6 * share(back)
+}
+
+/// The garment's own mesh: cut along the smoothed border, islands dropped, holes closed, remeshed.
+fn garment_mesh(take: &Take, graph: &ScanGraph, labels: &Labels, settings: &ExtractSettings) -> Mesh {
+    if !labels.garment.contains(&true) {
+        return Mesh::default();
+    }
+    let field = cut::smooth_field(graph, &take.scan.positions, &labels.garment, settings.hem_smoothing);
+    let mut scan = take.scan.clone();
+    scan.normals.clear();
+    scan.attributes.retain(|name, _| name == "filled");
+    scan.attributes.entry("filled".into()).or_insert_with(|| vec![0.0; graph.len()]);
+    scan.attributes.insert("confidence".into(), labels.confidence.clone());
+    let mut mesh = cut::cut_positive(&scan, &field);
+    mesh = clean::keep_large_pieces(&mesh, settings.piece_share);
+    clean::fill_holes(&mut mesh, &bones(take), settings.hole_rim.min(OPENING));
+    mesh.recompute_normals();
+    mesh
+}
+
+/// Segments from each joint to its parent.
+fn bones(take: &Take) -> Vec<[Point3<f32>; 2]> {
+    let at = take.pose.joint_positions(take.skeleton);
+    JOINTS
+        .iter()
+        .filter_map(|j| Some([at[j.parent()?.index()].cast::<f32>(), at[j.index()].cast::<f32>()]))
+        .collect()
+}
+
+fn warnings(graph: &ScanGraph, evidence: &Evidence, garment: &Mesh, pieces: usize) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if garment.is_empty() {
+        warnings.push(Warning::NothingNew);
+    }
+    let sunken = SUNKEN.max(4.0 * evidence.height_noise);
+    let area: f32 = (0..graph.len()).filter(|&v| evidence.height[v] < -sunken).map(|v| graph.areas[v]).sum();
+    if area > SUNKEN_AREA {
+        warnings.push(Warning::TakenOff(area));
+    }
+    if pieces > 2 {
+        warnings.push(Warning::SeveralPieces(pieces));
+    }
+    warnings
+}
+
+fn report(
+    take: &Take,
+    garment: &Mesh,
+    evidence: &Evidence,
+    garment_type: GarmentType,
+    pieces: usize,
+) -> ExtractionReport {
+    let share = |name: &str, holds: &dyn Fn(f32) -> bool| {
+        let values = garment.attributes.get(name).map(Vec::as_slice).unwrap_or(&[]);
+        values.iter().filter(|&&x| holds(x)).count() as f32 / values.len().max(1) as f32
+    };
+    let mut openings: Vec<f32> = boundary_loops(&garment.triangles)
+        .iter()
+        .map(|l| loop_length(&garment.positions, l))
+        .filter(|&l| l >= OPENING)
+        .collect();
+    openings.sort_by(|a, b| b.total_cmp(a));
+    ExtractionReport {
+        garment_type,
+        type_guessed: take.garment_type.is_none(),
+        area_m2: garment.area(),
+        unsure_share: share("confidence", &|c| c < UNSURE),
+        filled_share: share("filled", &|f| f > 0.5),
+        openings_m: openings,
+        height_noise_m: evidence.height_noise,
+        color_noise: evidence.color_noise,
+        pieces,
+    }
+}

@@ -1,0 +1,74 @@
+//! How high points lie over a surface that other layers must stay outside of.
+
+use nalgebra::{Point3, Vector3};
+use toile_geometry::{
+    Mesh,
+    bvh::{Bvh, Closest},
+    topology::Edges,
+};
+
+/// A point this far beyond the rim along the surface is not over it any more, metres.
+const BEYOND_RIM: f32 = 0.001;
+/// Barycentric coordinate under which the closest point counts as on the side.
+const ON_SIDE: f32 = 1e-4;
+
+/// A lower layer, ready for queries.
+pub struct LowerSurface<'a> {
+    /// Its mesh.
+    pub mesh: &'a Mesh,
+    /// Its hierarchy.
+    pub bvh: Bvh,
+    /// Its unit vertex normals.
+    pub normals: Vec<Vector3<f32>>,
+    open_sides: Vec<[bool; 3]>,
+}
+
+/// A point's place over a surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Height {
+    /// Signed distance, metres: negative inside.
+    pub value: f32,
+    /// The closest point.
+    pub point: Point3<f32>,
+    /// The surface's smooth normal there.
+    pub normal: Vector3<f32>,
+}
+
+impl<'a> LowerSurface<'a> {
+    /// Reads a mesh.
+    pub fn new(mesh: &'a Mesh) -> Self {
+        let edges = Edges::new(&mesh.triangles);
+        let open = |e: u32| edges.uses[e as usize] == 1;
+        Self {
+            mesh,
+            bvh: Bvh::new(&mesh.positions, &mesh.triangles),
+            normals: mesh.vertex_normals(),
+            open_sides: edges.of_triangle.iter().map(|s| s.map(open)).collect(),
+        }
+    }
+
+    /// Height of `p` over the surface, if it is within `reach` and not beyond the rim.
+    pub fn height(&self, p: &Point3<f32>, reach: f32) -> Option<Height> {
+        let hit = self.bvh.closest(p, reach)?;
+        let normal = self.smooth_normal(hit.triangle, hit.barycentric);
+        let away = p - hit.point;
+        let up = away.dot(&normal);
+        let beside = (away - normal * up).norm() > BEYOND_RIM;
+        if beside && self.on_rim(&hit) {
+            return None;
+        }
+        Some(Height { value: if up < 0.0 { -hit.distance } else { hit.distance }, point: hit.point, normal })
+    }
+
+    /// The interpolated vertex normal in a triangle.
+    pub fn smooth_normal(&self, triangle: u32, w: [f32; 3]) -> Vector3<f32> {
+        let corners = self.mesh.triangles[triangle as usize];
+        let sum = corners.iter().zip(w).fold(Vector3::zeros(), |s, (&v, w)| s + self.normals[v as usize] * w);
+        sum.try_normalize(1e-12).unwrap_or(self.normals[corners[0] as usize])
+    }
+
+    /// True where the closest point lies on an open side.
+    pub fn on_rim(&self, hit: &Closest) -> bool {
+        (0..3).any(|k| self.open_sides[hit.triangle as usize][k] && hit.barycentric[(k + 2) % 3] < ON_SIDE)
+    }
+}
