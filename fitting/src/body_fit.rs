@@ -14,6 +14,7 @@ use crate::{
     measure::{Measurements, measure},
     prepare::{Prepared, prepare},
     prior::JointPrior,
+    stance::standing,
     start::{Start, starts},
     thin::Thinned,
     verdict::{FitReport, judge},
@@ -220,10 +221,10 @@ fn assemble(
     let rest: Vec<Point3<f32>> = skinning::unskin(&conformed.points, &model.weights, &transforms);
     let mut mesh = Mesh::new(rest, model.triangles.clone());
     mesh.recompute_normals();
-    let measurements = measure(&mesh, &model.inner);
     let mut model_mesh = Mesh::new(model.posed(&beta, &pose), model.triangles.clone());
     model_mesh.recompute_normals();
     let body = SkinnedMesh { mesh, skeleton: skeleton.clone(), weights: model.weights.clone() };
+    let measurements = measure(&standing(&body), &model.inner);
     let mut notices = context.prepared.notices;
     if context.mend.rotation.angle() > 1e-9 {
         notices.push("the scan does not stand on +Y; turned upright".into());

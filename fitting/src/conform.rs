@@ -24,7 +24,7 @@ use toile_geometry::{
 use crate::{ConformSettings, FitSettings, FittingError, articulated::State};
 
 /// Draws an unseen vertex back to the statistical model.
-const TIE: f64 = 2e-3;
+const TIE: f64 = 1e-4;
 /// A triangle that turned by more than this cosine from the model's is taken for folded.
 const FOLD_COS: f32 = 0.2;
 

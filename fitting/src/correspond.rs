@@ -80,7 +80,7 @@ impl Gate {
         let value = d.dot(m);
         let slip = (d - m * value).norm();
         let fits = slip <= self.slip && value.abs() <= self.distance;
-        fits.then_some(Residual { vertex, point: *q, normal: *m, value, weight })
+        fits.then_some(Residual { vertex, normal: *m, value, weight })
     }
 
     /// Geman and McClure's weight.

@@ -1,6 +1,6 @@
 //! Normal equations of weighted point-to-plane residuals, summed in a fixed order.
 
-use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use crate::articulated::{Articulated, Columns, Posed};
@@ -12,7 +12,6 @@ const BLOCK: usize = 512;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual {
     pub vertex: u32,
-    pub point: Point3<f32>,
     pub normal: Vector3<f32>,
     /// Metres.
     pub value: f32,

@@ -2,6 +2,7 @@
 //!
 //! - [`fit_body`]: shape and pose of one scan (Hu et al. 2017, eq. 4), conformation, stature and girths;
 //! - [`rig_scan`], [`rigged_scan`]: skin weights onto the scan itself;
+//! - [`pose_under`]: any skinned mesh posed inside a more dressed scan (eq. 5 and 6);
 //! - [`measure()`]: stature and girths of a body at rest.
 //!
 //! A fit that should not be trusted is a result with a [`Verdict`]; having no answer is a [`FittingError`].
@@ -19,9 +20,11 @@ mod prepare;
 mod prior;
 mod rig;
 mod settings;
+mod stance;
 mod start;
 mod summary;
 mod thin;
+mod under;
 mod verdict;
 
 pub use body_fit::{BodyFit, fit_body};
@@ -31,4 +34,5 @@ pub use prepare::Mend;
 pub use rig::{rig_scan, rigged_scan};
 pub use settings::{ConformSettings, FitSettings, UnderSettings};
 pub use summary::{BodySummary, Theta};
+pub use under::{UnderFit, UnderReport, pose_under};
 pub use verdict::{DistanceStats, FitReport, Verdict};

@@ -1,0 +1,31 @@
+//! Carries a body through the takes: `fit_under BODY_SCAN.ply NEXT_SCAN.ply... OUT_FOLDER`; writes <n>-body.ply in the
+//! frame of each scan. The mesh that is posed is the scan of the take before, rigged.
+
+use std::{path::Path, time::Instant};
+
+use toile_character::BodyModel;
+use toile_fitting::{FitSettings, UnderSettings, fit_body, pose_under, rigged_scan};
+use toile_geometry::ply;
+
+#[allow(clippy::print_stdout)]
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [first, next @ .., out] = &arguments[..] else { return Err("usage: fit_under SCAN0 SCAN1... OUT".into()) };
+    let out = Path::new(out);
+    std::fs::create_dir_all(out)?;
+    let model = BodyModel::load_default()?;
+    let scan = ply::read(Path::new(first))?;
+    let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {})?;
+    let (mut pose, mut dressed) = (fit.pose.clone(), rigged_scan(&scan, &fit.body, &fit.pose));
+    for (n, path) in next.iter().enumerate() {
+        let scan = ply::read(Path::new(path))?;
+        let start = Instant::now();
+        let under = pose_under(&dressed, &[], &pose, &scan, &UnderSettings::default(), &|_| {})?;
+        println!("{path}: {:.2} s {}", start.elapsed().as_secs_f64(), serde_json::to_string(&under.report)?);
+        pose = under.pose;
+        ply::write(&out.join(format!("{}-body.ply", n + 1)), &fit.body.posed_mesh(&pose))?;
+        ply::write(&out.join(format!("{}-dressed.ply", n + 1)), &dressed.posed_mesh(&pose))?;
+        dressed = rigged_scan(&scan, &fit.body, &pose);
+    }
+    Ok(())
+}
