@@ -28,7 +28,7 @@ const OP_DATA_END: u8 = 0x0F;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Chunk {
     offset: u64,
-    length: u64,
+    pub(crate) length: u64,
     uncompressed: u64,
     zstd: bool,
     crc: u32,
@@ -47,6 +47,14 @@ pub(crate) struct Ending {
     pub(crate) damaged_bytes: u64,
 }
 
+impl Ending {
+    /// Counts a chunk of `bytes` bytes as damaged.
+    pub(crate) fn add_damaged(&mut self, bytes: u64) {
+        self.damaged_chunks += 1;
+        self.damaged_bytes += bytes;
+    }
+}
+
 /// One record inside a chunk.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Record<'a> {
@@ -58,11 +66,13 @@ pub(crate) enum Record<'a> {
     Message { channel_id: u16, start: usize, data: &'a [u8] },
 }
 
-/// What a scan finds outside of chunks.
+/// What stands in the file, known from the heads of its records alone.
 #[derive(Debug, Default)]
-pub(crate) struct Scan {
+pub(crate) struct Outline {
     pub(crate) chunks: Vec<Chunk>,
     pub(crate) metadata: BTreeMap<String, BTreeMap<String, String>>,
+    /// Schema and channel records of the summary section, as they stand in a chunk; empty in a torn file.
+    pub(crate) summary: Vec<u8>,
     pub(crate) ending: Ending,
 }
 
@@ -94,36 +104,43 @@ impl Container {
         Ok(Self { path: path.to_path_buf(), file, length })
     }
 
-    /// Walks over the whole file and hands each whole chunk's records to `visit`, with the chunk's index.
-    pub(crate) fn scan(
-        &mut self,
-        mut visit: impl FnMut(usize, &[u8]) -> Result<(), CaptureError>,
-    ) -> Result<Scan, CaptureError> {
-        let mut scan = Scan::default();
+    /// Walks over the heads of all records.
+    pub(crate) fn outline(&mut self) -> Result<Outline, CaptureError> {
+        let mut outline = Outline::default();
         let mut at = MAGIC.len() as u64;
         while at < self.length {
             let Some((op, length)) = self.record_header(at)? else { break };
             let body = at + 9;
             match op {
-                OP_CHUNK => self.scan_chunk(body, length, &mut scan, &mut visit)?,
+                OP_CHUNK => match self.parse_chunk(body, length)? {
+                    Some(chunk) => outline.chunks.push(chunk),
+                    None => outline.ending.add_damaged(length),
+                },
                 OP_METADATA if length <= MAX_METADATA_BYTES => {
                     let bytes = self.read(body, length)?;
-                    scan.metadata.extend(parse_metadata(&bytes));
+                    outline.metadata.extend(parse_metadata(&bytes));
                 }
-                OP_DATA_END => {
-                    scan.ending.closed = true;
-                    return Ok(scan);
+                OP_SCHEMA | OP_CHANNEL if outline.ending.closed && length <= MAX_METADATA_BYTES => {
+                    outline.summary.extend(self.read(at, 9 + length)?);
                 }
+                OP_DATA_END => outline.ending.closed = true,
                 _ => {}
             }
             at = body + length;
         }
-        scan.ending.torn_bytes = self.length.saturating_sub(at);
-        Ok(scan)
+        if !outline.ending.closed {
+            outline.ending.torn_bytes = self.length.saturating_sub(at);
+        }
+        Ok(outline)
     }
 
-    /// Reads a chunk's records again.
-    pub(crate) fn chunk_records(&mut self, chunk: &Chunk) -> Result<Vec<u8>, CaptureError> {
+    /// Reads a chunk's records and checks them; `None` where they are damaged.
+    pub(crate) fn checked_records(&mut self, chunk: &Chunk) -> Option<Vec<u8>> {
+        let records = self.chunk_records(chunk).ok()?;
+        (chunk.crc == 0 || crc32fast::hash(&records) == chunk.crc).then_some(records)
+    }
+
+    fn chunk_records(&mut self, chunk: &Chunk) -> Result<Vec<u8>, CaptureError> {
         let bytes = self.read(chunk.offset, chunk.length)?;
         if !chunk.zstd {
             return Ok(bytes);
@@ -153,30 +170,6 @@ impl Container {
         let (Some(op), Some(length)) = (cursor.u8(), cursor.u64()) else { return Ok(None) };
         let fits = length <= self.length - at - 9;
         Ok(fits.then_some((op, length)))
-    }
-
-    fn scan_chunk(
-        &mut self,
-        body: u64,
-        length: u64,
-        scan: &mut Scan,
-        visit: &mut impl FnMut(usize, &[u8]) -> Result<(), CaptureError>,
-    ) -> Result<(), CaptureError> {
-        let records = match self.parse_chunk(body, length)? {
-            Some(chunk) => {
-                let records = self.chunk_records(&chunk).ok();
-                records.filter(|records| chunk.crc == 0 || crc32fast::hash(records) == chunk.crc).map(|r| (chunk, r))
-            }
-            None => None,
-        };
-        let Some((chunk, records)) = records else {
-            scan.ending.damaged_chunks += 1;
-            scan.ending.damaged_bytes += length;
-            return Ok(());
-        };
-        visit(scan.chunks.len(), &records)?;
-        scan.chunks.push(chunk);
-        Ok(())
     }
 
     fn parse_chunk(&mut self, body: u64, length: u64) -> Result<Option<Chunk>, CaptureError> {

@@ -2,14 +2,56 @@
 //!
 //! - [`Frame`]: depth and colour of one sensor at one time, with device and host time and the device's frame number;
 //! - [`Rig`] and [`Sensor`]: cameras, calibration, identity;
-//! - [`Source`]: what live devices, replay and the synthetic sensor have in common.
+//! - [`Source`]: what live devices, replay and the synthetic sensor have in common;
+//! - [`Recorder`] writes frames to an MCAP file, [`Replay`] is the file as a source; [`depth_codec`] packs depth;
+//! - [`import`](mod@import) reads other people's folders; [`Subject`] is a person's folder with its takes;
+//!   [`inspect`](mod@inspect) says what is in any of them and whether it is healthy;
+//! - [`trajectory`]: poses over time as text; [`atomic_write`](mod@atomic_write): files that appear whole or not at all.
+//!
+//! ```
+//! use toile_capture::{DepthImage, DeviceIdentity, Frame, Recorder, RecorderOptions, Replay, Rig, Sensor, Source};
+//! use toile_geometry::{Rigid, camera::PinholeCamera};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let sensor = Sensor {
+//!     name: "front".into(),
+//!     identity: DeviceIdentity::default(),
+//!     depth: PinholeCamera::ideal(2, 1, 2.0, 2.0, 0.5, 0.0),
+//!     depth_scale: 0.001,
+//!     color: None,
+//!     color_from_depth: Rigid::identity(),
+//!     rig_from_depth: Rigid::identity(),
+//!     fps: 30.0,
+//! };
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("take.mcap");
+//! let mut recorder = Recorder::create(&path, &Rig { sensors: vec![sensor] }, RecorderOptions::default())?;
+//! let depth = DepthImage { width: 2, height: 1, values: vec![1500, 0] };
+//! recorder.write(&Frame {
+//!     sensor: 0,
+//!     index: 0,
+//!     device_frame: 17,
+//!     lost_before: 0,
+//!     device_time_ns: 1_000_000,
+//!     host_time_ns: 2_000_000,
+//!     depth: Some(depth.clone().into()),
+//!     color: None,
+//! })?;
+//! recorder.finish()?;
+//! let mut replay = Replay::open(&path)?;
+//! let frame = replay.next_frame()?.ok_or("one frame was recorded")?;
+//! assert_eq!(*frame.depth.ok_or("with depth")?, depth);
+//! # Ok(())
+//! # }
+//! ```
 
 pub mod atomic_write;
 mod container;
 pub mod depth_codec;
 pub mod error;
 pub mod frame;
+pub mod garment_type;
 pub mod import;
+pub mod inspect;
 mod message;
 mod protobuf;
 pub mod recording;
@@ -17,13 +59,17 @@ pub mod replay;
 pub mod rig;
 mod schema;
 pub mod source;
+pub mod subject;
 pub mod trajectory;
 
 pub use atomic_write::{atomic_write, atomic_write_with};
 pub use error::CaptureError;
 pub use frame::{ColorImage, DepthImage, Frame, RgbImage};
+pub use garment_type::GarmentType;
+pub use inspect::{Inspection, inspect};
 pub use recording::{DepthEncoding, Recorder, RecorderOptions, RecordingSummary, export_standard};
 pub use replay::{FrameInfo, Loss, Replay};
 pub use rig::{DeviceIdentity, Rig, Sensor};
 pub use source::Source;
+pub use subject::{Layer, PendingTake, Subject};
 pub use trajectory::TimedPose;

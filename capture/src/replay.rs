@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::{
     CaptureError, ColorImage, DepthImage, Frame, Rig, Source,
-    container::{Chunk, Container, Ending, Record, Scan, records},
+    container::{Chunk, Container, Ending, Outline, Record, records},
     depth_codec,
     message::{ImageMessage, Stamp},
     recording::{METADATA, rgb_from_bytes},
@@ -27,6 +27,8 @@ pub struct Loss {
     pub damaged_chunks: u32,
     /// Numbers missing between the frames that were read (frames of damaged chunks).
     pub missing_frames: u64,
+    /// Images in whole chunks that cannot be told apart, because what declared them was in a damaged chunk.
+    pub orphan_images: u64,
     /// True when the file was never closed or is cut off: frames after the last one that was read may be gone.
     pub torn: bool,
     /// Frames that could be read.
@@ -42,6 +44,9 @@ impl fmt::Display for Loss {
         }
         if self.missing_frames > 0 {
             write!(f, "; {} frames among them are lost", self.missing_frames)?;
+        }
+        if self.orphan_images > 0 {
+            write!(f, "; {} images cannot be told apart", self.orphan_images)?;
         }
         write!(f, "; {} bytes could not be read", self.bytes)
     }
@@ -103,15 +108,22 @@ impl Replay {
     /// [`CaptureError`] where the file cannot be read, is no MCAP, was not written by Toile, or holds no frame.
     pub fn open(path: &Path) -> Result<Self, CaptureError> {
         let mut container = Container::open(path)?;
-        let mut index = Index { path, schemas: BTreeMap::new(), channels: BTreeMap::new(), entries: Vec::new() };
-        let scan = container.scan(|chunk, bytes| index.add_chunk(chunk, bytes))?;
-        let entries = index.entries;
-        let rig = read_rig(path, &scan)?;
+        let mut outline = container.outline()?;
+        let rig = read_rig(path, &outline)?;
+        let mut index = Index::new(path);
+        index.add_records(0, &outline.summary)?;
+        for (number, chunk) in outline.chunks.iter().enumerate() {
+            match container.checked_records(chunk) {
+                Some(bytes) => index.add_records(number, &bytes)?,
+                None => outline.ending.add_damaged(chunk.length),
+            }
+        }
+        let Index { entries, orphans, .. } = index;
         if entries.is_empty() {
-            let reason = if scan.ending.closed {
+            let reason = if outline.ending.closed && outline.ending.damaged_chunks == 0 {
                 "the recording holds no frames"
             } else {
-                "the recording was cut off before its first chunk was whole: no frame can be read"
+                "the recording was cut off or damaged in its first chunk: no frame can be read"
             };
             return Err(CaptureError::format(path, reason));
         }
@@ -119,9 +131,9 @@ impl Replay {
             let reason = format!("a frame comes from sensor {}, which the rig does not have", entry.stamp.sensor);
             return Err(CaptureError::format(path, reason));
         }
-        let lost = loss(&scan.ending, &entries);
+        let lost = loss(&outline.ending, &entries, orphans);
         let (container, path) = (Mutex::new(container), path.to_path_buf());
-        Ok(Self { rig, entries, chunks: scan.chunks, container, path, lost, next: 0 })
+        Ok(Self { rig, entries, chunks: outline.chunks, container, path, lost, next: 0 })
     }
 
     /// The file.
@@ -223,13 +235,20 @@ impl Source for Replay {
 /// Collects where each frame's messages stand, while the file is scanned.
 struct Index<'a> {
     path: &'a Path,
+    /// Every channel that was declared; `None` for those that are not ours.
+    channels: BTreeMap<u16, Option<(Schema, bool)>>,
     schemas: BTreeMap<u16, String>,
-    channels: BTreeMap<u16, (Schema, bool)>,
     entries: Vec<Entry>,
+    /// Messages whose channel's declaration is lost.
+    orphans: u64,
 }
 
-impl Index<'_> {
-    fn add_chunk(&mut self, chunk: usize, bytes: &[u8]) -> Result<(), CaptureError> {
+impl<'a> Index<'a> {
+    fn new(path: &'a Path) -> Self {
+        Self { path, channels: BTreeMap::new(), schemas: BTreeMap::new(), entries: Vec::new(), orphans: 0 }
+    }
+
+    fn add_records(&mut self, chunk: usize, bytes: &[u8]) -> Result<(), CaptureError> {
         let records = records(bytes)
             .ok_or_else(|| CaptureError::format(self.path, format!("chunk {chunk} holds no readable records")))?;
         for record in records {
@@ -240,9 +259,7 @@ impl Index<'_> {
                 Record::Channel { id, schema_id, metadata } => {
                     let schema = self.schemas.get(&schema_id).and_then(|name| Schema::from_name(name));
                     let is_depth = metadata.get("toile.stream").map(|stream| stream == "depth");
-                    if let (Some(schema), Some(is_depth)) = (schema, is_depth) {
-                        self.channels.insert(id, (schema, is_depth));
-                    }
+                    self.channels.insert(id, schema.zip(is_depth));
                 }
                 Record::Message { channel_id, start, data } => self.add_message(chunk, channel_id, start, data)?,
             }
@@ -251,10 +268,14 @@ impl Index<'_> {
     }
 
     fn add_message(&mut self, chunk: usize, channel: u16, start: usize, data: &[u8]) -> Result<(), CaptureError> {
-        let Some(&(schema, is_depth)) = self.channels.get(&channel) else { return Ok(()) };
-        if schema == Schema::CameraCalibration {
-            return Ok(());
-        }
+        let (schema, is_depth) = match self.channels.get(&channel) {
+            Some(Some((Schema::CameraCalibration, _)) | None) => return Ok(()),
+            Some(Some(channel)) => *channel,
+            None => {
+                self.orphans += 1;
+                return Ok(());
+            }
+        };
         let message = ImageMessage::decode(schema, data).ok_or_else(|| {
             CaptureError::format(self.path, format!("an image message in chunk {chunk} is not readable"))
         })?;
@@ -273,9 +294,9 @@ impl Index<'_> {
     }
 }
 
-fn read_rig(path: &Path, scan: &Scan) -> Result<Rig, CaptureError> {
-    let Some(metadata) = scan.metadata.get(METADATA) else {
-        let reason = if scan.ending.closed || !scan.chunks.is_empty() {
+fn read_rig(path: &Path, outline: &Outline) -> Result<Rig, CaptureError> {
+    let Some(metadata) = outline.metadata.get(METADATA) else {
+        let reason = if outline.ending.closed || !outline.chunks.is_empty() {
             "is an MCAP file, but no recording of Toile's (there is no metadata record `toile.recording` in it)"
         } else {
             "was cut off before its rig was written: nothing can be read"
@@ -294,8 +315,8 @@ fn read_rig(path: &Path, scan: &Scan) -> Result<Rig, CaptureError> {
     }
 }
 
-fn loss(ending: &Ending, entries: &[Entry]) -> Option<Loss> {
-    if ending.closed && ending.damaged_chunks == 0 {
+fn loss(ending: &Ending, entries: &[Entry], orphans: u64) -> Option<Loss> {
+    if ending.closed && ending.damaged_chunks == 0 && orphans == 0 {
         return None;
     }
     let numbers = entries.iter().map(|entry| entry.stamp.frame_index);
@@ -304,6 +325,7 @@ fn loss(ending: &Ending, entries: &[Entry]) -> Option<Loss> {
         bytes: ending.torn_bytes + ending.damaged_bytes,
         damaged_chunks: ending.damaged_chunks,
         missing_frames: expected.saturating_sub(entries.len() as u64),
+        orphan_images: orphans,
         torn: !ending.closed,
         frames_read: entries.len() as u64,
     })

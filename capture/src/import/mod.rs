@@ -25,7 +25,7 @@ mod folder;
 mod images;
 mod inventory;
 mod poses;
-mod record;
+pub(crate) mod record;
 mod seven_scenes;
 mod tum;
 mod uva;

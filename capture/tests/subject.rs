@@ -1,0 +1,155 @@
+//! Subjects on disk and their inspection.
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::{image_folder, record_frames, shared};
+use toile_capture::{GarmentType, Recorder, RecorderOptions, Subject, import, inspect};
+
+fn add(subject: &mut Subject, name: &str, frames: u64) {
+    let take = subject.next_take(name, None).unwrap();
+    record_frames(&take.path, frames, 1, 1200);
+    assert_eq!(subject.accept(take).unwrap(), None);
+}
+
+#[test]
+fn takes_are_numbered_and_come_back() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path().join("deep/maple");
+    let mut subject = Subject::open_or_create(&folder).unwrap();
+    assert!(subject.next_take("trousers", None).unwrap_err().to_string().contains("take 0 is the body"));
+    add(&mut subject, "body", 2);
+    add(&mut subject, "jeans", 3);
+    add(&mut subject, "02-scarf", 1);
+    let again = Subject::open_or_create(&folder).unwrap();
+    assert_eq!(again, subject);
+    let labels: Vec<_> = again.layers().iter().map(|layer| layer.label()).collect();
+    assert_eq!(labels, ["00-body", "01-jeans", "02-scarf"]);
+    let types: Vec<_> = again.layers().iter().map(|layer| layer.garment).collect();
+    assert_eq!(types, [None, Some(GarmentType::Trousers), Some(GarmentType::Other)]);
+    assert_eq!((again.name(), again.date().len()), ("maple", 10));
+    let layer = again.layer("01-jeans").unwrap();
+    assert!(again.take_path(layer).ends_with("takes/01-jeans.mcap") && again.take_path(layer).is_file());
+    assert!(again.build_folder(layer).ends_with("build/01-jeans"));
+    assert!(again.edits_path(layer).ends_with("edits/01-jeans.json"));
+    for (name, reason) in
+        [("jeans", "--retake"), ("", "no layer name"), ("../x", "no layer name"), ("Å", "no layer name")]
+    {
+        assert!(again.next_take(name, None).unwrap_err().to_string().contains(reason), "{name}");
+    }
+    assert!(Subject::create(&folder).unwrap_err().to_string().contains("exists already"));
+}
+
+#[test]
+fn a_retake_keeps_the_old_take() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut subject = Subject::create(temp.path()).unwrap();
+    add(&mut subject, "body", 2);
+    add(&mut subject, "wrap", 3);
+    let path = subject.take_path(&subject.layers()[1]);
+    for round in 1..=2 {
+        let old = fs::read(&path).unwrap();
+        let take = subject.retake("wrap", Some(GarmentType::Skirt)).unwrap();
+        record_frames(&take.path, 3 + round, 1, 4000);
+        assert_eq!(fs::read(&path).unwrap(), old, "the old take stays until the new one is accepted");
+        let kept = subject.accept(take).unwrap().unwrap();
+        assert!(kept.ends_with(format!("takes/rejected/01-wrap.{round}.mcap")), "{}", kept.display());
+        assert_eq!(fs::read(kept).unwrap(), old);
+        assert_ne!(fs::read(&path).unwrap(), old);
+    }
+    let again = Subject::open(temp.path()).unwrap();
+    assert_eq!((again.layers().len(), again.layers()[1].garment), (2, Some(GarmentType::Skirt)));
+    assert!(again.retake("hat", None).unwrap_err().to_string().contains("body, wrap"));
+    let missing = again.next_take("hat", None).unwrap();
+    assert!(subject.accept(missing).unwrap_err().to_string().contains("not recorded"));
+}
+
+#[test]
+fn a_killed_import_is_completed_on_opening() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut subject = Subject::create(temp.path()).unwrap();
+    add(&mut subject, "body", 2);
+    record_frames(&subject.next_take("skirt", None).unwrap().path, 2, 1, 4000);
+    let mut reopened = Subject::open(temp.path()).unwrap();
+    assert_eq!(reopened.layers()[1].label(), "01-skirt", "recorded, but not yet in subject.toml");
+    add(&mut reopened, "coat", 1);
+    let take = reopened.retake("skirt", None).unwrap();
+    record_frames(&take.path, 4, 1, 4000);
+    let path = reopened.take_path(&take.layer);
+    fs::rename(&path, temp.path().join("takes/moved-away")).unwrap();
+    assert!(Subject::open(temp.path()).is_ok() && path.is_file() && !take.path.exists());
+}
+
+#[test]
+fn broken_subjects_get_one_clear_sentence() {
+    let temp = tempfile::tempdir().unwrap();
+    assert!(Subject::open(temp.path()).unwrap_err().to_string().contains("is no subject"));
+    for (text, expected) in [
+        ("name = \"x\"\nlayers = 3\n", "line 2"),
+        ("nothing", "line 1"),
+        ("date = \"2026-01-01\"\n", "missing field `name`"),
+        ("name = \"x\"\n[[layers]]\nname = \"../../etc\"\n", "`../../etc` is no layer name"),
+        ("name = \"x\"\n[[layers]]\nname = \"a\"\ntype = \"toga\"\n", "toga"),
+    ] {
+        fs::write(temp.path().join("subject.toml"), text).unwrap();
+        let error = Subject::open(temp.path()).unwrap_err().to_string();
+        assert!(error.contains(expected) && !error.contains('\n'), "{error}\nexpected {expected}");
+    }
+}
+
+#[test]
+fn inspection_tells_healthy_from_not() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("images"), 6);
+    let good = inspect(&folder).unwrap();
+    assert!(good.healthy && !good.data_lost, "{good}");
+    let sensor = &good.takes[0].sensors[0];
+    assert_eq!((sensor.frames, sensor.lost_frames, sensor.depth_valid_share), (6, 0, 1.0));
+    assert!((sensor.fps_measured - 10.0).abs() < 1e-9 && (good.takes[0].duration_s - 0.5).abs() < 1e-9);
+    assert!(good.to_string().contains("healthy"));
+    for file in ["depth/000002.png", "color/000002.jpg", "color/000004.jpg"] {
+        fs::remove_file(folder.join(file)).unwrap();
+    }
+    let gap = inspect(&folder).unwrap();
+    assert!(!gap.healthy && !gap.data_lost);
+    let text = gap.to_string();
+    assert!(text.contains("1 frames lost") && text.contains("have no colour: 4"), "{text}");
+    assert_eq!(gap.takes[0].sensors[0].gaps[0].before_frame, 3);
+}
+
+#[test]
+fn inspection_of_torn_takes_and_subjects() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut subject = Subject::create(&temp.path().join("elm")).unwrap();
+    add(&mut subject, "body", 4);
+    add(&mut subject, "top", 4);
+    let path = subject.take_path(&subject.layers()[1]);
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() * 2 / 3]).unwrap();
+    let report = inspect(subject.folder()).unwrap();
+    assert!(report.data_lost && report.takes[0].loss.is_none() && report.takes[1].loss.is_some());
+    let text = report.to_string();
+    assert!(text.contains("subject elm") && text.contains("01-top (top)") && text.contains("cut off"), "{text}");
+    serde_json::to_string(&report).unwrap();
+    fs::write(&path, b"").unwrap();
+    assert!(inspect(subject.folder()).unwrap().to_string().contains("the file is empty"));
+    assert!(inspect(Path::new("/nowhere")).unwrap_err().to_string().contains("/nowhere"));
+}
+
+#[test]
+fn real_subject_imports_and_is_healthy() {
+    let Some(data) = shared("subjects/birch") else { return };
+    let temp = tempfile::tempdir().unwrap();
+    let mut subject = Subject::create(&temp.path().join("birch")).unwrap();
+    for (name, from) in [("body", "00-body"), ("skirt", "01-skirt")] {
+        let mut source = import::open(&data.join(from), None).unwrap();
+        let take = subject.next_take(name, None).unwrap();
+        let recorder = Recorder::create(&take.path, source.rig(), RecorderOptions::default()).unwrap();
+        assert!(import::record(source.as_mut(), recorder, &|_| ()).unwrap().is_complete());
+        subject.accept(take).unwrap();
+    }
+    let report = inspect(subject.folder()).unwrap();
+    assert!(report.healthy, "{report}");
+    assert_eq!(report.takes[1].frames, 100);
+}
