@@ -1,1 +1,46 @@
-//! The dressed character as files: GLB and VRM.
+//! The dressed character as files: binary glTF and VRM 1.0.
+//!
+//! - [`Avatar`]: skeleton, the pose that the layers are in, layers with their skin weights, motions;
+//! - [`write_glb`]: one mesh node a layer, one skin, one animation a motion; with a single layer, a rigged scan;
+//! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named.
+//!
+//! ```
+//! use nalgebra::Point3;
+//! use toile_avatar::{Avatar, AvatarLayer, write_glb};
+//! use toile_character::{JOINT_COUNT, Pose, Skeleton, SkinWeights};
+//! use toile_geometry::Mesh;
+//!
+//! let corners = [[0.0, 1.0, 0.0], [0.1, 1.0, 0.0], [0.0, 1.1, 0.0]].map(Point3::from);
+//! let mut weights = SkinWeights::default();
+//! corners.iter().for_each(|_| weights.push(&[(0, 1.0)]));
+//! let avatar = Avatar {
+//!     name: "alder".into(),
+//!     skeleton: Skeleton { rest: [Point3::new(0.0, 1.0, 0.0); JOINT_COUNT] },
+//!     pose0: Pose::identity(),
+//!     layers: vec![AvatarLayer {
+//!         name: "body".into(),
+//!         mesh: Mesh::new(corners.to_vec(), vec![[0, 1, 2]]),
+//!         weights,
+//!         order: 0,
+//!         garment: None,
+//!         thickness: None,
+//!     }],
+//!     motions: Vec::new(),
+//! };
+//! assert!(write_glb(&avatar)?.starts_with(b"glTF"));
+//! # Ok::<(), toile_avatar::AvatarError>(())
+//! ```
+
+mod buffer;
+mod clip;
+pub mod dressed;
+pub mod error;
+pub mod glb;
+mod layer_mesh;
+mod rig;
+pub mod vrm;
+
+pub use dressed::{Avatar, AvatarLayer};
+pub use error::AvatarError;
+pub use glb::write_glb;
+pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, write_vrm};

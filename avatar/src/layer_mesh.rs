@@ -1,0 +1,158 @@
+//! One layer as a glTF mesh: positions, normals, linear colours, skin weights, indices.
+
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+use toile_character::SkinWeights;
+
+use crate::{
+    AvatarLayer,
+    buffer::{Buffer, Shape, Target},
+};
+
+/// Appends the layer's arrays to `buffer`; returns the glTF mesh, which uses material `material`.
+pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buffer) -> Value {
+    let mesh = &layer.mesh;
+    let positions: Vec<f32> = mesh.positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
+    let normals = if mesh.normals.is_empty() { mesh.vertex_normals() } else { mesh.normals.clone() };
+    let normals: Vec<f32> = normals.iter().flat_map(unit).collect();
+    let (joints, weights) = influences(&layer.weights);
+    let mut attributes = json!({
+        "POSITION": buffer.add_bounded(&positions, Shape::Vec3, Target::Vertices),
+        "NORMAL": buffer.add(&normals, Shape::Vec3, Target::Vertices),
+        "JOINTS_0": buffer.add(&joints, Shape::Vec4, Target::Vertices),
+        "WEIGHTS_0": buffer.add(&weights, Shape::Vec4, Target::Vertices),
+    });
+    if !mesh.colors.is_empty() {
+        let colors = buffer.add(&linear_colors(&mesh.colors), Shape::Vec4, Target::Vertices);
+        attributes["COLOR_0"] = json!(buffer.normalized(colors));
+    }
+    json!({
+        "name": layer.name,
+        "primitives": [{
+            "attributes": attributes,
+            "indices": indices(&mesh.triangles, mesh.positions.len(), buffer),
+            "material": material,
+            "mode": 4,
+        }],
+    })
+}
+
+/// The material of a layer: matt, its colour from the vertices, both sides of cloth visible.
+pub(crate) fn material(layer: &AvatarLayer) -> Value {
+    const NEUTRAL: [f64; 4] = [0.6, 0.6, 0.6, 1.0];
+    let base = if layer.mesh.colors.is_empty() { NEUTRAL } else { [1.0; 4] };
+    json!({
+        "name": layer.name,
+        "doubleSided": layer.order > 0,
+        "pbrMetallicRoughness": { "baseColorFactor": base, "metallicFactor": 0.0, "roughnessFactor": 1.0 },
+    })
+}
+
+/// What importers cannot know: order of dressing, type of garment, thickness.
+pub(crate) fn extras(layer: &AvatarLayer) -> Value {
+    let mut extras = json!({ "layer": layer.order });
+    if let Some(garment) = &layer.garment {
+        extras["garment"] = json!(garment);
+    }
+    if let Some(thickness) = layer.thickness {
+        // shortest decimal of the f32, not its binary expansion
+        extras["thickness_m"] = thickness.to_string().parse::<f64>().map_or(Value::Null, |t| json!(t));
+    }
+    extras
+}
+
+/// Unit length as the format demands; straight up where a vertex has no normal.
+fn unit(normal: &Vector3<f32>) -> [f32; 3] {
+    let unit = normal.cast::<f64>().try_normalize(1e-12).unwrap_or_else(Vector3::y);
+    unit.cast::<f32>().into()
+}
+
+fn indices(triangles: &[[u32; 3]], vertices: usize, buffer: &mut Buffer) -> usize {
+    // the largest u16 is reserved: it restarts a primitive
+    if vertices < usize::from(u16::MAX) {
+        let short: Vec<u16> = triangles.iter().flatten().map(|&i| i as u16).collect();
+        buffer.add(&short, Shape::Scalar, Target::Indices)
+    } else {
+        buffer.add(triangles.as_flattened(), Shape::Scalar, Target::Indices)
+    }
+}
+
+/// glTF's vertex colours are linear; 16 bits keep the dark ones apart.
+fn linear_colors(colors: &[[u8; 3]]) -> Vec<u16> {
+    let table: Vec<u16> = (0..=255u8).map(|c| (linear_of_srgb(c) * f64::from(u16::MAX)).round() as u16).collect();
+    colors.iter().flat_map(|c| [table[c[0] as usize], table[c[1] as usize], table[c[2] as usize], u16::MAX]).collect()
+}
+
+/// IEC 61966-2-1, decoding.
+fn linear_of_srgb(value: u8) -> f64 {
+    let c = f64::from(value) / 255.0;
+    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Joints and weights, four a vertex. Weights are whole 65536ths and sum to 1 without rounding; unused slots are
+/// joint 0, weight 0; no joint comes twice.
+fn influences(weights: &SkinWeights) -> (Vec<u8>, Vec<f32>) {
+    const WHOLE: u32 = 1 << 16;
+    let (mut joints, mut out) = (Vec::with_capacity(4 * weights.len()), Vec::with_capacity(4 * weights.len()));
+    for v in 0..weights.len() {
+        let mut slots: Vec<(u8, f32)> = Vec::with_capacity(4);
+        for (joint, weight) in weights.of(v) {
+            match slots.iter_mut().find(|s| s.0 == joint) {
+                Some(slot) => slot.1 += weight,
+                None => slots.push((joint, weight)),
+            }
+        }
+        slots.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let sum: f64 = slots.iter().map(|s| f64::from(s.1)).sum();
+        let mut parts = [(0u8, 0u32); 4];
+        for (part, (joint, weight)) in parts.iter_mut().zip(&slots) {
+            let share = (f64::from(*weight) / sum * f64::from(WHOLE)).round() as u32;
+            *part = if share > 0 { (*joint, share) } else { (0, 0) };
+        }
+        // what rounding left over or took goes to the largest
+        let rest: u32 = parts[1..].iter().map(|p| p.1).sum();
+        parts[0].1 = WHOLE - rest;
+        joints.extend(parts.map(|p| p.0));
+        out.extend(parts.map(|p| p.1 as f32 / WHOLE as f32));
+    }
+    (joints, out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_sum_to_exactly_one() {
+        let mut weights = SkinWeights::default();
+        for i in 0..500u16 {
+            let t = f32::from(i) * 0.7;
+            weights.push(&[(3, t.sin().abs()), (1, t.cos().abs()), (51, 0.1), (7, 1e-7)]);
+        }
+        weights.joints.push([5, 5, 0, 0]);
+        weights.weights.push([0.5, 0.5, 0.0, 0.0]);
+        let (joints, out) = influences(&weights);
+        for (j, w) in joints.chunks(4).zip(out.chunks(4)) {
+            assert_eq!(w.iter().sum::<f32>(), 1.0);
+            assert!(j.iter().zip(w).all(|(j, w)| *w > 0.0 || *j == 0));
+        }
+        assert_eq!(joints[2000..], [5, 0, 0, 0]);
+        assert_eq!(out[2000..], [1.0, 0.0, 0.0, 0.0]);
+        let half = weights.of(1).find(|i| i.0 == 3).unwrap().1;
+        let slot = joints[4..8].iter().position(|j| *j == 3).unwrap();
+        assert!((out[4 + slot] - half).abs() < 1e-4);
+    }
+
+    #[test]
+    fn colours_become_linear() {
+        assert_eq!(linear_colors(&[[0, 255, 0]]), [0, 65535, 0, 65535]);
+        // sRGB 188 is 0.5029 linear
+        assert!((f64::from(linear_colors(&[[188, 0, 0]])[0]) / 65535.0 - 0.5029).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_vertex_without_a_normal_points_up() {
+        assert_eq!(unit(&Vector3::zeros()), [0.0, 1.0, 0.0]);
+        assert_eq!(unit(&Vector3::new(0.0, 0.0, 9.0)), [0.0, 0.0, 1.0]);
+    }
+}

@@ -1,0 +1,66 @@
+//! The skeleton as glTF nodes and a skin.
+
+use nalgebra::{Isometry3, Point3, Translation3};
+use serde_json::{Map, Value, json};
+use toile_character::{JOINT_COUNT, Joint, Pose, Skeleton, joint::JOINTS};
+
+use crate::buffer::{Buffer, Shape, Target};
+
+/// Joint frames that the layers are bound to; node i is the joint with index i.
+pub(crate) struct Rig {
+    /// `scene_from_joint`, by [`Joint::index`].
+    frames: Vec<Isometry3<f64>>,
+}
+
+impl Rig {
+    /// Joints as they stand and are turned in `pose`.
+    pub fn posed(skeleton: &Skeleton, pose: &Pose) -> Self {
+        Self { frames: pose.joint_frames(skeleton) }
+    }
+
+    /// Joints where `pose` puts them, all axes along the scene's, as VRM likes its rest.
+    pub fn unturned(skeleton: &Skeleton, pose: &Pose) -> Self {
+        let place = |p: &Point3<f64>| Isometry3::from(Translation3::from(p.coords));
+        Self { frames: pose.joint_positions(skeleton).iter().map(place).collect() }
+    }
+
+    /// `parent_from_joint` of `joint`.
+    fn local(&self, joint: Joint) -> Isometry3<f64> {
+        let frame = self.frames[joint.index()];
+        joint.parent().map_or(frame, |p| self.frames[p.index()].inverse() * frame)
+    }
+
+    /// The 52 nodes in joint order.
+    pub fn nodes(&self) -> Vec<Value> {
+        JOINTS.iter().map(|&joint| self.node(joint)).collect()
+    }
+
+    fn node(&self, joint: Joint) -> Value {
+        let local = self.local(joint);
+        let children: Vec<usize> = JOINTS.iter().filter(|c| c.parent() == Some(joint)).map(|c| c.index()).collect();
+        let mut node = Map::new();
+        node.insert("name".into(), json!(joint.name()));
+        node.insert("translation".into(), json!(local.translation.vector.as_slice()));
+        if local.rotation.angle() > 0.0 {
+            node.insert("rotation".into(), json!(local.rotation.coords.as_slice()));
+        }
+        if !children.is_empty() {
+            node.insert("children".into(), json!(children));
+        }
+        Value::Object(node)
+    }
+
+    /// The skin, its inverse bind matrices added to `buffer`.
+    pub fn skin(&self, buffer: &mut Buffer) -> Value {
+        let mut matrices: Vec<f32> = Vec::with_capacity(16 * JOINT_COUNT);
+        for frame in &self.frames {
+            matrices.extend(frame.inverse().to_homogeneous().cast::<f32>().iter());
+        }
+        json!({
+            "name": "skeleton",
+            "skeleton": Joint::Hips.index(),
+            "joints": (0..JOINT_COUNT).collect::<Vec<_>>(),
+            "inverseBindMatrices": buffer.add(&matrices, Shape::Mat4, Target::Data),
+        })
+    }
+}

@@ -1,0 +1,150 @@
+//! The avatar as VRM 1.0 (VRM Consortium, VRMC_vrm-1.0): a GLB that rests in a T-pose and says which bone is which.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use toile_character::{Joint, dress_pose::t_pose, joint::JOINTS};
+
+use crate::{
+    Avatar, AvatarError,
+    buffer::Buffer,
+    glb::{document, finish},
+    rig::Rig,
+};
+
+/// The licence text that VRM 1.0 files refer to.
+const LICENCE_URL: &str = "https://vrm.dev/licenses/1.0/";
+
+/// Who may wear an avatar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum AvatarPermission {
+    /// The author alone.
+    OnlyAuthor,
+    /// People whom the author licensed.
+    OnlySeparatelyLicensedPerson,
+    /// Anyone.
+    Everyone,
+}
+
+/// For what an avatar may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub enum CommercialUsage {
+    /// By persons, without profit.
+    PersonalNonProfit,
+    /// By persons, also for profit.
+    PersonalProfit,
+    /// By companies too.
+    Corporation,
+}
+
+/// What VRM says about an avatar. The default allows the author alone to use it: it shows a real person.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct VrmMeta {
+    /// Name; the avatar's own where empty.
+    pub name: String,
+    /// Version of the avatar.
+    pub version: String,
+    /// Authors; at least one.
+    pub authors: Vec<String>,
+    /// Who may wear it.
+    pub avatar_permission: AvatarPermission,
+    /// For what it may be used.
+    pub commercial_usage: CommercialUsage,
+    /// May it be passed on?
+    pub allow_redistribution: bool,
+    /// May it be changed, and the changed one passed on?
+    pub allow_modification: bool,
+    /// Must the authors be named?
+    pub credit_required: bool,
+}
+
+impl Default for VrmMeta {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            version: "1".into(),
+            authors: vec!["unknown".into()],
+            avatar_permission: AvatarPermission::OnlyAuthor,
+            commercial_usage: CommercialUsage::PersonalNonProfit,
+            allow_redistribution: false,
+            allow_modification: false,
+            credit_required: true,
+        }
+    }
+}
+
+/// The avatar as a VRM 1.0 file.
+///
+/// All layers are moved to the T-pose by their skin weights (A → T baking) with feet at the height they rest at;
+/// bones rest without rotation, facing +Z; all 52 joints are named, the 15 that VRM requires among them. Motions
+/// are left out: VRM keeps them in files of their own.
+///
+/// # Errors
+/// What [`Avatar::validate`] finds; [`AvatarError::Avatar`] where no author is named.
+pub fn write_vrm(avatar: &Avatar, meta: &VrmMeta) -> Result<Vec<u8>, AvatarError> {
+    if meta.authors.is_empty() || meta.authors.iter().any(|a| a.trim().is_empty()) {
+        return Err(AvatarError::Avatar("a VRM file names at least one author".into()));
+    }
+    let baked = avatar.in_pose(&t_pose(&avatar.skeleton))?;
+    let rig = Rig::unturned(&baked.skeleton, &baked.pose0);
+    let mut buffer = Buffer::default();
+    let mut document = document(&baked, &rig, &mut buffer);
+    document.insert("extensionsUsed".into(), json!(["VRMC_vrm"]));
+    document.insert("extensions".into(), json!({ "VRMC_vrm": extension(&baked, meta) }));
+    finish(buffer, document)
+}
+
+fn extension(avatar: &Avatar, meta: &VrmMeta) -> Value {
+    let bones: Map<String, Value> =
+        JOINTS.iter().map(|j| (j.name().to_string(), json!({ "node": j.index() }))).collect();
+    let first_mesh_node = JOINTS.len();
+    let annotations: Vec<Value> =
+        (0..avatar.layers.len()).map(|i| json!({ "node": first_mesh_node + i, "type": "auto" })).collect();
+    json!({
+        "specVersion": "1.0",
+        "meta": meta_of(avatar, meta),
+        "humanoid": { "humanBones": bones },
+        "firstPerson": { "meshAnnotations": annotations },
+        "lookAt": look_at(avatar),
+    })
+}
+
+fn meta_of(avatar: &Avatar, meta: &VrmMeta) -> Value {
+    let modification = match (meta.allow_modification, meta.allow_redistribution) {
+        (false, _) => "prohibited",
+        (true, false) => "allowModification",
+        (true, true) => "allowModificationRedistribution",
+    };
+    json!({
+        "name": if meta.name.is_empty() { &avatar.name } else { &meta.name },
+        "version": meta.version,
+        "authors": meta.authors,
+        "licenseUrl": LICENCE_URL,
+        "avatarPermission": meta.avatar_permission,
+        "commercialUsage": meta.commercial_usage,
+        "creditNotation": if meta.credit_required { "required" } else { "unnecessary" },
+        "allowRedistribution": meta.allow_redistribution,
+        "modification": modification,
+        "allowExcessivelyViolentUsage": false,
+        "allowExcessivelySexualUsage": false,
+        "allowPoliticalOrReligiousUsage": false,
+        "allowAntisocialOrHateUsage": false,
+    })
+}
+
+/// Where the eyes are, seen from the head's joint: there are no eye bones to turn.
+fn look_at(avatar: &Avatar) -> Value {
+    // Eyes lie about as far above the head's joint as the neck is long, and well in front of it.
+    let neck = avatar.skeleton.offset(Joint::Head).norm();
+    let range = json!({ "inputMaxValue": 90.0, "outputScale": 10.0 });
+    json!({
+        "type": "bone",
+        "offsetFromHeadBone": [0.0, 0.7 * neck, 0.9 * neck],
+        "rangeMapHorizontalInner": range,
+        "rangeMapHorizontalOuter": range,
+        "rangeMapVerticalDown": range,
+        "rangeMapVerticalUp": range,
+    })
+}
