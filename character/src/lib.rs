@@ -4,10 +4,22 @@
 //! - [`joint`]: the 52 VRM humanoid joints and their hierarchy;
 //! - [`Skeleton`]: where the joints of one person rest; [`Pose`]: how they are turned;
 //! - [`SkinWeights`] and [`skinning`]: linear blend skinning (Hu et al. 2017, eq. 3) and its inverse;
-//! - [`BodyModel`]: the statistical body (eq. 1 joints, eq. 2 shape) from the committed asset;
+//! - [`BodyModel`]: the statistical body (eq. 1 joints by [`mean_value`], eq. 2 shape) from the committed asset ([`asset`]);
+//! - [`dress_pose`]: the A- and T-pose of any skeleton;
 //! - [`Motion`]: a pose over time.
 //!
 //! Subject frame: +Y up, +Z the front, +X the subject's left; metres, radians, seconds.
+//!
+//! ```
+//! use toile_character::BodyModel;
+//!
+//! let model = BodyModel::load_default()?;
+//! let beta = [1.0, -0.5]; // taller than most; the other components stay at the mean
+//! let rest = model.shape(&beta); // A-pose
+//! let avatar_rest = model.posed(&beta, &model.t_pose(&beta));
+//! assert_eq!(rest.len(), avatar_rest.len());
+//! # Ok::<(), toile_character::CharacterError>(())
+//! ```
 
 pub mod asset;
 pub mod body_model;

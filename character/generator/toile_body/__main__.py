@@ -7,6 +7,7 @@ import pickle
 import time
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from . import asset, balance, measure, model, mpfb, population, rig, sliders, surface
 
@@ -57,8 +58,10 @@ def describe(base):
     region = surface.regions(table, dense)
     v = base.vertices[:n]
     eyes = base.vertices
-    inner = surface.hidden(v, base.triangles, eyes, base.hidden_triangles, region == surface.REGIONS.index("head"))
+    throat = np.isin(np.argmax(dense, 1), [[name for name, _, _ in table].index(j) for j in ("neck", "head")])
+    inner = surface.hidden(v, base.triangles, eyes, base.hidden_triangles, throat)
     inner = surface.close_mask(inner, base.triangles, 3)
+    inner |= inner[cKDTree(v).query(v * [-1, 1, 1])[1]]  # the same on both sides
     return {"table": table, "order": order, "units": units, "lost": lost, "region": region, "inner": inner,
             "nipples": peaks(base, "breast/nipple-point-incr"), "navel": peak(base, "stomach/stomach-navel-in")}
 

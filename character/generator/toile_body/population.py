@@ -9,11 +9,11 @@ from .measure import NAMES
 
 RACES = ("african", "asian", "caucasian")
 LOCAL_SPREAD = 0.12  # of every local slider; 0.22 gives exaggerated bodies
-WIDE_SCALE = 1.7  # how much wider than ANSUR II the second stratum's logarithms spread
+WIDE_SCALE = 2.0  # how much wider than ANSUR II the second stratum spreads along the two strongest axes of its logarithms
 WIDE_BMI = (15.5, 45.0)
 # Solved sliders: name, spread of its prior, bounds. The first four are macro sliders, the others local ones.
 SOLVED = (
-    ("height", 0.30, 0.0, 1.0), ("weight", 0.35, 0.0, 1.15), ("soft", 0.40, 0.0, 1.0), ("strong", 0.40, 0.0, 1.0),
+    ("height", 0.30, 0.0, 1.0), ("weight", 0.35, 0.0, 1.15), ("soft", 0.40, 0.0, 1.0), ("strong", 0.20, 0.0, 0.8),
     ("torso/measure-bust-circ-decr-incr", 0.30, -0.8, 0.8), ("torso/measure-waist-circ-decr-incr", 0.30, -0.8, 0.8),
     ("torso/measure-hips-circ-decr-incr", 0.30, -0.8, 0.8), ("torso/torso-scale-depth-decr-incr", 0.20, -0.8, 0.8),
     ("torso/torso-scale-horiz-decr-incr", 0.20, -0.8, 0.8), ("hip/hip-scale-depth-decr-incr", 0.20, -0.8, 0.8),
@@ -22,6 +22,7 @@ SOLVED = (
 )
 SOFT_STRONG = (2, 3)  # their places in SOLVED
 TOLERANCE = np.array([0.001, 0.006, 0.005, 0.006, 0.005])  # of the logarithm of each measure
+MOST = 0.35  # of a slider's change in a step
 REFRESH = 1  # after this step the Jacobian is measured anew; else it is updated
 CHUNK = 100
 
@@ -47,8 +48,8 @@ def draw(rng, count, wide_share, moments, local_names):
     macro = {
         "gender": np.where(male, 1 - spread, spread),
         "age": sl.age_from_years(rng.uniform(18, 80, count)),
-        "soft": clip(rng.normal(0.35, 0.12, count)),
-        "strong": clip(np.where(male, 0.35, 0.25) + rng.normal(0, 0.12, count)),
+        "soft": clip(rng.normal(0.4, 0.12, count)),
+        "strong": clip(np.where(male, 0.35, 0.2) + rng.normal(0, 0.12, count)),
         "weight": clip(rng.normal(0.65, 0.1, count)),
         "height": np.full(count, 0.5),
         "proportions": clip(rng.normal(0.5, 0.15, count)),
@@ -66,10 +67,11 @@ def draw(rng, count, wide_share, moments, local_names):
 def draw_goal(rng, m, wide):
     """One person's logarithms of the five measures."""
     mean, cov = np.array(m["log_mean"]), np.array(m["log_covariance"])
-    scale = WIDE_SCALE if wide else 1.0
-    root = np.linalg.cholesky(cov)
+    values, axes = np.linalg.eigh(cov)  # the last two: fatness and stature
+    axes *= np.sign(axes[np.abs(axes).argmax(0), np.arange(len(mean))])
+    scale = np.array([1.0, 1.0, 1.0, WIDE_SCALE, WIDE_SCALE]) if wide else 1.0
     while True:
-        x = mean + scale * (root @ rng.normal(size=len(mean)))
+        x = mean + axes @ (scale * np.sqrt(values) * rng.normal(size=len(mean)))
         bmi = np.exp(x[1] - 2 * x[0])
         if not wide or WIDE_BMI[0] < bmi < WIDE_BMI[1]:
             return x
@@ -104,18 +106,10 @@ def solve(shapes, tape, people, steps=6, log=print):
     """Moves the solved sliders to the most likely values that meet each person's goal (Gauss-Newton, Broyden updates)."""
     x0 = get_solved(shapes.sliders, people)
     x = x0.copy()
-    prior = np.array([s[1] for s in SOLVED])
-    low, high = np.array([s[2] for s in SOLVED]), np.array([s[3] for s in SOLVED])
     f = measure_all(shapes, tape, people)
     jacobian = differences(shapes, tape, people, x, f)
     for step in range(steps):
-        dx = np.zeros_like(x)
-        for i in range(len(x)):
-            a = jacobian[i] / TOLERANCE[:, None]
-            r = (people.goal[i] - f[i]) / TOLERANCE
-            h = a.T @ a + np.diag(prior**-2)
-            dx[i] = np.linalg.solve(h, a.T @ r + (x0[i] - x[i]) / prior**2)
-        new = np.clip(x + np.clip(dx, -0.35, 0.35), low, high)
+        new = np.array([gauss_newton(x[i], x0[i], f[i], people.goal[i], jacobian[i]) for i in range(len(x))])
         put_solved(shapes.sliders, people, new)
         g = measure_all(shapes, tape, people)
         rms = np.sqrt(((g - people.goal) ** 2).mean(0)) * 100
@@ -126,9 +120,26 @@ def solve(shapes, tape, people, steps=6, log=print):
             x, f = new, g
             continue
         miss = (g - f) - np.einsum("imk,ik->im", jacobian, s)
-        jacobian += miss[:, :, None] * s[:, None, :] / ((s * s).sum(1) + 1e-9)[:, None, None]
+        jacobian += miss[:, :, None] * s[:, None, :] / ((s * s).sum(1) + 1e-6)[:, None, None]
         x, f = new, g
     return f
+
+
+def gauss_newton(x, x0, f, goal, jacobian):
+    """One step of one person; sliders that would leave their range are held at its end and the others solved again."""
+    prior, low, high = (np.array([s[k] for s in SOLVED]) for k in (1, 2, 3))
+    a, r = jacobian / TOLERANCE[:, None], (goal - f) / TOLERANCE
+    free, step = np.ones(len(x), bool), np.zeros(len(x))
+    for _ in range(len(x)):
+        held = a[:, ~free] @ step[~free]
+        h = a[:, free].T @ a[:, free] + np.diag(prior[free] ** -2)
+        step[free] = np.linalg.solve(h, a[:, free].T @ (r - held) + ((x0 - x) / prior**2)[free])
+        out = free & ((x + step < low) | (x + step > high))
+        if not out.any():
+            break
+        step[out] = (np.clip(x + step, low, high) - x)[out]
+        free &= ~out
+    return np.clip(x + np.clip(step, -MOST, MOST), low, high)
 
 
 def get_solved(sliders, people):

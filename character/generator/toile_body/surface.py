@@ -16,6 +16,15 @@ def vertex_areas(v, triangles):
     return out
 
 
+def vertex_normals(v, triangles):
+    """Area-weighted unit normals."""
+    face = np.cross(v[triangles[:, 1]] - v[triangles[:, 0]], v[triangles[:, 2]] - v[triangles[:, 0]])
+    out = np.zeros_like(v)
+    for k in range(3):
+        np.add.at(out, triangles[:, k], face)
+    return out / np.linalg.norm(out, axis=1, keepdims=True)
+
+
 def is_closed(triangles):
     """True when every edge has exactly two triangles that run along it in opposite directions."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
@@ -41,8 +50,10 @@ def regions(table, dense):
 def hidden(v, triangles, eyes_v, eyes_t, among):
     """True for the vertices `among` (mask) that are seen from no direction, with eyeballs in their sockets.
 
-    Depth maps of densely sampled surfaces stand in for rays. Views from below are left out: there the trunk is in the way.
+    Depth maps of densely sampled surfaces stand in for rays; a vertex is only seen from its outer side. Views from below
+    are left out: there the trunk is in the way.
     """
+    normal = vertex_normals(v, triangles)
     index = np.flatnonzero(among)
     near = v[triangles][:, :, 1].min(1) > v[index, 1].min() - 0.05
     points = sample(np.concatenate([v[triangles[near]], eyes_v[eyes_t]]), 0.5 * PIXEL)
@@ -58,7 +69,7 @@ def hidden(v, triangles, eyes_v, eyes_t, among):
         size = np.maximum(p.max(0), q.max(0)) - low + 1
         depth = np.full(size[0] * size[1], -np.inf)
         np.maximum.at(depth, (p - low) @ [size[1], 1], points @ d)
-        seen |= v[index] @ d >= depth[(q - low) @ [size[1], 1]] - SLACK
+        seen |= (v[index] @ d >= depth[(q - low) @ [size[1], 1]] - SLACK) & (normal[index] @ d > 0)
     out = np.zeros(len(v), bool)
     out[index[~seen]] = True
     return out
