@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use toile_render::{Drawn, View, picture, png, sheet};
-use toile_synthetic::{Subject, SyntheticSettings};
+use toile_render::{Drawn, RgbImage, View, colormap::viridis, picture, png, sheet};
+use toile_synthetic::{Subject, SyntheticSettings, Take};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -25,6 +25,30 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let sheet = sheet::contact_sheet(&tiles, 4)?;
         std::fs::write(Path::new(&out).join(format!("{}.png", take.name)), png::encode(&sheet)?)?;
+        let frames = sheet::contact_sheet(&frames(&take)?, 3)?;
+        std::fs::write(Path::new(&out).join(format!("{}-frames.png", take.name)), png::encode(&frames)?)?;
     }
     Ok(())
+}
+
+/// Colour and depth of three frames.
+fn frames(take: &Take) -> Result<Vec<(String, RgbImage)>, Box<dyn std::error::Error>> {
+    let (mut colors, mut depths) = (Vec::new(), Vec::new());
+    for share in [0.0, 0.15, 0.5] {
+        let frame = take.frame((take.moments.len() as f32 * share) as usize)?;
+        if let Some(color) = &frame.color {
+            let image = color.decode(frame.index)?;
+            let bytes = image.pixels.iter().flatten().copied().collect();
+            let image = RgbImage::from_raw(image.width, image.height, bytes).ok_or("no pixels")?;
+            colors.push((format!("color {}", frame.index), image));
+        }
+        if let Some(depth) = &frame.depth {
+            let color = |&d: &u16| if d == 0 { [0; 3] } else { viridis(f32::from(d), (1700.0, 2700.0)) };
+            let bytes = depth.values.iter().flat_map(color).collect();
+            let image = RgbImage::from_raw(depth.width, depth.height, bytes).ok_or("no pixels")?;
+            depths.push((format!("depth {}", frame.index), image));
+        }
+    }
+    colors.extend(depths);
+    Ok(colors)
 }

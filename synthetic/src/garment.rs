@@ -27,6 +27,8 @@ const GAP: f32 = 0.005;
 const MARGIN: f32 = 0.14;
 /// Blur of the distance over ±this length, metres, so that cloth bridges hollows.
 const BRIDGE: f32 = 0.018;
+/// How much wider a garment is cut for each layer below it, metres.
+const PADDING: f32 = 0.008;
 /// A garment's solid ends this far beyond its cut, metres.
 const OVERLAP: f32 = 0.02;
 /// Rounds of smoothing of the weights: cloth does not follow one leg alone.
@@ -77,6 +79,8 @@ struct Wardrobe<'a> {
     outermost: Field,
     /// Limb that each node is nearest to.
     limbs: Vec<Limb>,
+    /// How many garments there are.
+    layers: usize,
 }
 
 impl<'a> Wardrobe<'a> {
@@ -87,7 +91,8 @@ impl<'a> Wardrobe<'a> {
             None => Limb::Trunk,
         };
         let radius = (BRIDGE / grid.cell).round().max(1.0) as usize;
-        Self { person, bridged: body.blurred(radius, 2), limbs: nearest.iter().map(limb).collect(), outermost: body }
+        let limbs = nearest.iter().map(limb).collect();
+        Self { person, bridged: body.blurred(radius, 2), limbs, outermost: body, layers: 0 }
     }
 
     fn add(&mut self, wanted: &GarmentSettings, cut_to: &Tailoring, seed: u64) -> Result<Garment, SyntheticError> {
@@ -104,6 +109,7 @@ impl<'a> Wardrobe<'a> {
         mesh.colors = pattern::colors(&mesh.positions, &wanted.pattern, seed);
         let worn = self.weighted(mesh);
         self.outermost = self.joined(&cloth, cut_to);
+        self.layers += 1;
         Ok(Garment { name, kind: wanted.kind, worn })
     }
 
@@ -111,9 +117,11 @@ impl<'a> Wardrobe<'a> {
     fn level(&self, cut_to: &Tailoring) -> Field {
         let grid = &self.bridged.grid;
         let tubes = Tubes::new(self.person, grid, cut_to);
+        let padding = PADDING * self.layers as f32;
         let free = Field::from_fn(grid, |i, p| {
-            let body = self.bridged.values[i];
-            let tube = if self.limbs[i] == Limb::Trunk { tubes.distance(grid.node(i)[1], p) } else { f32::INFINITY };
+            let body = self.bridged.values[i] - padding;
+            let tube =
+                if self.limbs[i] == Limb::Trunk { tubes.distance(grid.node(i)[1], p) - padding } else { f32::INFINITY };
             body + cut_to.drape * (tube - body).min(0.0) - ease_at(cut_to, p)
         });
         let mut cloth = free.blurred(1, 2);

@@ -139,17 +139,16 @@ impl BodyPaint {
     fn color(&self, p: &Point3<f32>, region: Region, inner: bool) -> [u8; 3] {
         let (base, variation) = if region == Region::Head && self.is_hair(p) {
             (self.hair, 0.18)
-        } else if self.is_underwear(p, region) {
-            (self.underwear, 0.07)
         } else if inner {
             (self.skin.map(|c| c * 0.45), 0.05)
         } else {
-            (self.skin, 0.09)
+            let share = self.underwear(p, region);
+            (std::array::from_fn(|k| self.skin[k] + (self.underwear[k] - self.skin[k]) * share), 0.09)
         };
         let coarse = noise::layered(p, Vector3::repeat(0.06), self.seed);
         let fine = noise::layered(p, Vector3::repeat(0.018), self.seed ^ 1);
         let light = 1.0 + variation * (0.6 * coarse + 0.6 * fine);
-        base.map(|c| (c * light).clamp(0.0, 255.0) as u8)
+        base.map(|c: f32| (c * light).clamp(0.0, 255.0) as u8)
     }
 
     /// Above a plane that falls from the hairline to the nape.
@@ -159,12 +158,15 @@ impl BodyPaint {
         (p - hairline).dot(&Vector3::new(0.0, 0.80, -0.60)) > 0.0 && p.y > self.chin.y
     }
 
-    fn is_underwear(&self, p: &Point3<f32>, region: Region) -> bool {
+    /// How much of a place is underwear, 0..1: soft edges, since skin has a vertex every half centimetre only.
+    fn underwear(&self, p: &Point3<f32>, region: Region) -> f32 {
         use Region::*;
+        const EDGE: f32 = 0.006;
         let waist = self.crotch.y + 0.72 * (self.navel.y - self.crotch.y);
         let down_leg = (Point3::new(p.x.abs(), p.y, p.z) - self.crotch).dot(&self.leg);
-        let briefs = matches!(region, Torso | LeftLeg | RightLeg) && p.y < waist && down_leg < 0.075;
-        let bra = self.bra && region == Torso && (p.y - self.nipple.y + 0.01).abs() < 0.058;
-        briefs || bra
+        let trunk = matches!(region, Torso | LeftLeg | RightLeg);
+        let briefs = if trunk { (waist - p.y).min(0.075 - down_leg) } else { -EDGE };
+        let bra = if self.bra && region == Torso { 0.058 - (p.y - self.nipple.y + 0.01).abs() } else { -EDGE };
+        (0.5 + 0.5 * briefs.max(bra) / EDGE).clamp(0.0, 1.0)
     }
 }

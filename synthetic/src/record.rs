@@ -2,9 +2,34 @@
 
 use std::path::Path;
 
-use toile_capture::{Recorder, RecorderOptions, RecordingSummary};
+use toile_capture::{GarmentType, Recorder, RecorderOptions, RecordingSummary, subject::BODY};
 
-use crate::{SyntheticError, take::Take};
+use crate::{SyntheticError, subject::Subject, take::Take};
+
+/// Records every take of a subject into a new subject folder: subject.toml and takes/NN-layer.mcap.
+///
+/// # Errors
+/// [`SyntheticError`] where `folder` is a subject already, or a file cannot be written.
+pub fn record_subject(
+    subject: &Subject,
+    folder: &Path,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Vec<RecordingSummary>, SyntheticError> {
+    let mut entry = toile_capture::Subject::create(folder)?;
+    let mut summaries = Vec::new();
+    for n in 0..subject.take_count() {
+        let take = subject.take(n)?;
+        let kind = n.checked_sub(1).map(|g| subject.garments[g].kind);
+        let name = kind.map_or(BODY, |k| k.name());
+        let pending = entry.next_take(name, kind.and_then(|k| GarmentType::from_layer_name(k.name())))?;
+        let share = 1.0 / subject.take_count() as f32;
+        let options = RecorderOptions { replace_part: true, ..RecorderOptions::default() };
+        summaries.push(record_take(&take, &pending.path, options, &|p| progress((n as f32 + p) * share))?);
+        entry.accept(pending)?;
+    }
+    entry.set_rig(&format!("synthetic {}", subject.settings.sensor.name()))?;
+    Ok(summaries)
+}
 
 /// Records every frame of a take into an MCAP file.
 ///

@@ -48,22 +48,24 @@ impl Plane {
     }
 }
 
-/// Where a top ends around the neck: above a plane near the neck, and above a height everywhere.
+/// Where a top ends around the neck: a ball around the root of the neck, and everything above the collar.
 #[derive(Debug, Clone, Copy)]
 struct Neckline {
-    plane: Plane,
     center: Point3<f32>,
     radius: f32,
     highest: f32,
 }
 
 impl Neckline {
-    /// The hole reaches farther to the front and back than to the shoulders.
-    const REACH: f32 = 0.6;
+    /// From this far beside the axis the collar may rise with the shoulders, metres.
+    const COLLAR: f32 = 0.07;
+    /// How steeply it may rise.
+    const RISE: f32 = 0.7;
 
     fn outside(&self, p: &Point3<f32>) -> f32 {
-        let from_axis = (p.x - self.center.x).hypot((p.z - self.center.z) * Self::REACH);
-        self.plane.outside(p).min(self.radius - from_axis).max(p.y - self.highest)
+        let beside = ((p.x - self.center.x).abs() - Self::COLLAR).max(0.0);
+        let above = p.y - self.highest - Self::RISE * beside;
+        (self.radius - (p - self.center).norm()).max(above)
     }
 }
 
@@ -104,8 +106,8 @@ impl Tailoring {
         let measure = Measure { model, person };
         let vary = random.range(-1.0, 1.0) as f32;
         match kind {
-            GarmentKind::Trousers => measure.bottoms(0.93 + 0.01 * vary, 0.009, 0.10),
-            GarmentKind::Shorts => measure.bottoms(0.42 + 0.03 * vary, 0.011, 0.25),
+            GarmentKind::Trousers => measure.bottoms(0.93 + 0.01 * vary, 0.010, 0.025),
+            GarmentKind::Shorts => measure.bottoms(0.42 + 0.03 * vary, 0.011, 0.05),
             GarmentKind::Skirt => measure.skirt(0.9 + 0.06 * vary),
             GarmentKind::Tshirt => measure.top(0.30 + 0.02 * vary, 0.05, 0.010, 0.6),
             GarmentKind::Blouse => measure.top(0.86 + 0.02 * vary, 0.03, 0.010, 0.6),
@@ -189,13 +191,11 @@ impl Measure<'_> {
         Plane { point: Point3::new(0.0, y, 0.0), normal }
     }
 
-    /// A neckline `drop` metres below the pit of the throat and `wide` metres from the neck's axis at the sides.
-    fn neckline(&self, drop: f32, wide: f32) -> Neckline {
-        let nape = self.landmark("cervicale");
-        let throat = self.landmark("suprasternale") - Vector3::new(0.0, drop, 0.0);
-        let along = (throat - nape).try_normalize(1e-6).unwrap_or(Vector3::z());
-        let plane = Plane { point: nape, normal: Vector3::new(0.0, along.z, -along.y) };
-        Neckline { plane, center: self.joint(Joint::Neck), radius: wide, highest: nape.y + 0.01 }
+    /// A round neckline `wide` metres off the root of the neck.
+    fn neckline(&self, wide: f32) -> Neckline {
+        let (nape, throat) = (self.landmark("cervicale"), self.landmark("suprasternale"));
+        let center = nalgebra::center(&nape, &throat);
+        Neckline { center, radius: 0.5 * (nape - throat).norm() + wide, highest: nape.y + 0.012 }
     }
 
     fn bottoms(&self, leg_share: f32, ease: f32, flare: f32) -> Tailoring {
@@ -210,7 +210,7 @@ impl Measure<'_> {
             ease,
             drape: 0.0,
             drape_from: self.landmark("crotch").y,
-            flare: flare * 0.12,
+            flare,
             pleats: 0.0,
             lower_end: knee,
             creases: 0.005,
@@ -245,7 +245,7 @@ impl Measure<'_> {
         let lower_end = hip + 0.05 - below;
         Tailoring {
             ends: vec![self.level(lower_end, false)],
-            neckline: Some(self.neckline(0.0, 0.085)),
+            neckline: Some(self.neckline(0.026)),
             legs: None,
             sleeves: Some(self.sleeves(sleeve_share)),
             opening: None,
@@ -263,7 +263,7 @@ impl Measure<'_> {
     fn open_top(&self, sleeve_share: f32, below: f32, ease: f32) -> Tailoring {
         let front = self.joint(Joint::Chest).z;
         let closed = self.top(sleeve_share, below, ease, 0.9);
-        Tailoring { neckline: Some(self.neckline(0.03, 0.095)), opening: Some((0.05, front)), ..closed }
+        Tailoring { neckline: Some(self.neckline(0.045)), opening: Some((0.05, front)), ..closed }
     }
 
     fn coat(&self, sleeve_share: f32) -> Tailoring {

@@ -55,6 +55,19 @@ fn is_seen(mesh: &Mesh, t: usize, normal: &Vector3<f32>, camera: &Camera, depth:
     z > 0.0 && p.z as f32 <= z + BEHIND
 }
 
+/// Writes the truth of every take and of the person: `DIR/NN-layer/truth/` and `DIR/subject.json`.
+///
+/// # Errors
+/// [`SyntheticError::Capture`] names the file that could not be written.
+pub fn write_subject(subject: &Subject, dir: &Path) -> Result<(), SyntheticError> {
+    for n in 0..subject.take_count() {
+        let take = subject.take(n)?;
+        write(&take, &dir.join(&take.name).join("truth"))?;
+    }
+    let text = format!("{:#}\n", subject_json(subject));
+    Ok(atomic_write(&dir.join("subject.json"), text.as_bytes())?)
+}
+
 /// Writes a take's truth into `folder`: surface.ply, body.ply or garment_n.ply, poses.txt, pose.json, sway.txt.
 ///
 /// # Errors

@@ -1,0 +1,36 @@
+//! Makes the session shipped in `recorded/`: `make_recorded FOLDER [TRUTH_FOLDER]`.
+
+use std::path::Path;
+
+use toile_synthetic::{
+    GarmentKind, GarmentSettings, Pattern, Sex, Subject, SyntheticSettings, record::record_subject, truth,
+};
+
+/// The person and the garments of the shipped session.
+fn rowan() -> SyntheticSettings {
+    let garment = |kind, pattern| GarmentSettings { kind, pattern };
+    SyntheticSettings {
+        name: "rowan".into(),
+        seed: 11,
+        sex: Sex::Female,
+        variety: 0.45,
+        garments: vec![
+            garment(GarmentKind::Trousers, Pattern::Denim([44, 62, 112])),
+            garment(GarmentKind::Tshirt, Pattern::Stripes([232, 196, 92], [46, 110, 108], 0.09)),
+        ],
+        frames: 72,
+        degrees: 365.0,
+        ..SyntheticSettings::default()
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().ok_or("usage: make_recorded FOLDER [TRUTH_FOLDER]")?;
+    let subject = Subject::new(&rowan())?;
+    record_subject(&subject, Path::new(&folder), &|_| ())?;
+    if let Some(truth_folder) = arguments.next() {
+        truth::write_subject(&subject, Path::new(&truth_folder))?;
+    }
+    Ok(())
+}
