@@ -134,7 +134,11 @@ impl Source for Folder {
             lost_before: 0,
             device_time_ns: time,
             host_time_ns: time,
-            depth: Some(Arc::new(DepthImage { width: image.width(), height: image.height(), values: image.into_raw() })),
+            depth: Some(Arc::new(DepthImage {
+                width: image.width(),
+                height: image.height(),
+                values: image.into_raw(),
+            })),
             color,
         }))
     }

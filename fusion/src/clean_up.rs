@@ -1,12 +1,33 @@
 //! From the raw surface to the scan: one component, closed, smooth, light.
 
-use toile_geometry::{Mesh, topology};
+use std::collections::BTreeSet;
 
-use crate::{settings::FusionSettings, surface::WEIGHT};
+use toile_geometry::{
+    Mesh,
+    components::{largest_component, make_manifold, trim_border},
+    decimate::decimate,
+    holes::{FILLED, fill_holes},
+    smooth::taubin,
+    topology::{Edges, boundary_loops, loop_length},
+};
+
+use crate::{
+    settings::{FusionSettings, Volume},
+    surface::WEIGHT,
+};
+
+/// Borders longer than this are closed by a surface of least area: a plate would bulge, metres.
+const PLATE_LENGTH: f32 = 0.9;
+/// A hole whose border stays below this height over the disk is a sole, metres.
+const SOLE_HEIGHT: f32 = 0.03;
+/// A sole reaches the disk within this distance of its border, metres.
+const SOLE_EDGE: f32 = 0.008;
 
 /// What the clean-up did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cleaned {
+    /// Loose pieces removed.
+    pub pieces_removed: usize,
     /// Holes closed.
     pub holes: usize,
     /// Share of the area that was filled, percent.
@@ -15,16 +36,78 @@ pub struct Cleaned {
     pub watertight: bool,
 }
 
-/// Cleans a raw surface in the scan's frame.
-pub fn clean_up(mut mesh: Mesh, settings: &FusionSettings, bottom: Option<f64>) -> (Mesh, Cleaned) {
-    let _ = (settings, bottom);
-    mesh.attributes.remove(WEIGHT);
-    let (label, count) = topology::vertex_components(mesh.positions.len(), &mesh.triangles);
-    let mut sizes = vec![0usize; count];
-    mesh.triangles.iter().for_each(|t| sizes[label[t[0] as usize] as usize] += 1);
-    let best = (0..count).max_by_key(|&c| (sizes[c], usize::MAX - c)).unwrap_or(0) as u32;
-    let triangles = &mesh.triangles;
-    let (mut mesh, _) = mesh.filter_triangles(|t| label[triangles[t][0] as usize] == best);
+/// Cleans a raw surface in the scan's frame. Where the subject stands on a level (`on_floor`), soles are closed flat
+/// at height 0.
+pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, on_floor: bool) -> (Mesh, Cleaned) {
+    raw.attributes.remove(WEIGHT);
+    raw.normals.clear();
+    let closed = settings.fill_holes && settings.volume == Volume::Auto;
+    let mut mesh = make_manifold(&raw);
+    let mut cleaned = Cleaned::default();
+    if settings.volume == Volume::Auto {
+        let (one, pieces) = largest_component(&mesh);
+        let trimmed = make_manifold(&trim_border(&one, 3));
+        mesh = largest_component(&trimmed).0;
+        cleaned.pieces_removed = pieces.saturating_sub(1);
+    }
+    if closed {
+        let soles = if on_floor { sole_borders(&mesh) } else { Vec::new() };
+        let (filled, report) = fill_holes(&mesh, f32::INFINITY, PLATE_LENGTH);
+        cleaned.holes = report.holes;
+        mesh = filled;
+        flatten_soles(&mut mesh, &soles);
+    } else {
+        mesh.attributes.insert(FILLED.into(), vec![0.0; mesh.positions.len()]);
+    }
+    let triangles = std::mem::take(&mut mesh.triangles);
+    taubin(&mut mesh.positions, &triangles, settings.smoothing_passes, &[]);
+    mesh.triangles = triangles;
+    if settings.target_triangles > 0 && mesh.triangles.len() > settings.target_triangles {
+        mesh = decimate(&mesh, settings.target_triangles);
+    }
+    round_filled(&mut mesh);
     mesh.recompute_normals();
-    (mesh, Cleaned::default())
+    cleaned.filled_percent = filled_percent(&mesh);
+    cleaned.watertight = Edges::new(&mesh.triangles).is_closed();
+    (mesh, cleaned)
+}
+
+/// Border positions of the holes that lie on the disk.
+fn sole_borders(mesh: &Mesh) -> Vec<nalgebra::Point3<f32>> {
+    let low = |l: &Vec<u32>| l.iter().all(|&v| mesh.positions[v as usize].y < SOLE_HEIGHT);
+    let soles = boundary_loops(&mesh.triangles).into_iter().filter(low);
+    let large = soles.filter(|l| loop_length(&mesh.positions, l) > 0.05);
+    large.flatten().collect::<BTreeSet<u32>>().into_iter().map(|v| mesh.positions[v as usize]).collect()
+}
+
+/// Lets filled vertices near the disk go down to it, and none below.
+fn flatten_soles(mesh: &mut Mesh, borders: &[nalgebra::Point3<f32>]) {
+    if borders.is_empty() {
+        return;
+    }
+    let filled = mesh.attributes.get(FILLED).cloned().unwrap_or_default();
+    for (p, _) in mesh.positions.iter_mut().zip(&filled).filter(|(p, f)| **f == 1.0 && p.y < SOLE_HEIGHT) {
+        let nearest = borders.iter().map(|b| (b.x - p.x).hypot(b.z - p.z)).fold(f32::INFINITY, f32::min);
+        let share = (1.0 - nearest / SOLE_EDGE).clamp(0.0, 1.0);
+        p.y = p.y.max(0.0) * share;
+    }
+}
+
+/// Decimation blends the mark; it is a yes or a no.
+fn round_filled(mesh: &mut Mesh) {
+    if let Some(marks) = mesh.attributes.get_mut(FILLED) {
+        marks.iter_mut().for_each(|m| *m = if *m > 0.5 { 1.0 } else { 0.0 });
+    }
+}
+
+fn filled_percent(mesh: &Mesh) -> f64 {
+    let Some(marks) = mesh.attributes.get(FILLED) else { return 0.0 };
+    let (mut filled, mut all) = (0.0, 0.0);
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(t).map(|p| p.cast::<f64>());
+        let area = (b - a).cross(&(c - a)).norm();
+        all += area;
+        filled += area * triangle.iter().map(|&v| f64::from(marks[v as usize])).sum::<f64>() / 3.0;
+    }
+    100.0 * filled / f64::max(all, 1e-12)
 }

@@ -146,9 +146,8 @@ fn match_pixel(view: &View, p: &Point3<f32>, normal: [f32; 3], gate: f32) -> Opt
 fn overlapping_pairs(nodes: &[Node], poses: &[Rigid]) -> Vec<(usize, usize)> {
     let count = nodes.len();
     let far = STRIDES[STRIDES.len() - 1];
-    let wanted = |i: usize, j: usize| {
-        STRIDES.contains(&(j - i)) || (j - i > far && (i + 2 * j).is_multiple_of(SEAM_THINNING))
-    };
+    let wanted =
+        |i: usize, j: usize| STRIDES.contains(&(j - i)) || (j - i > far && (i + 2 * j).is_multiple_of(SEAM_THINNING));
     let all: Vec<(usize, usize)> =
         (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))).filter(|&(i, j)| wanted(i, j)).collect();
     let overlaps = |&&(i, j): &&(usize, usize)| {

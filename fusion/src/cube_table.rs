@@ -11,8 +11,7 @@ pub(crate) const EDGES: [[usize; 2]; 12] =
     [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
 /// Corners of each face, counter-clockwise seen from outside the cube.
-const FACES: [[usize; 4]; 6] =
-    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+const FACES: [[usize; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
 /// Triangles (edge indices) of each sign pattern; bit k set: corner k is inside. Counter-clockwise from outside.
 pub(crate) static TRIANGLES: LazyLock<Vec<Vec<[u8; 3]>>> = LazyLock::new(|| (0..256).map(triangulate).collect());
@@ -87,7 +86,11 @@ mod tests {
             let crossed = |e: usize| (pattern >> EDGES[e][0] & 1) != (pattern >> EDGES[e][1] & 1);
             let triangles = &TRIANGLES[pattern];
             for e in 0..12 {
-                assert_eq!(triangles.iter().flatten().any(|&x| x as usize == e), crossed(e), "pattern {pattern} edge {e}");
+                assert_eq!(
+                    triangles.iter().flatten().any(|&x| x as usize == e),
+                    crossed(e),
+                    "pattern {pattern} edge {e}"
+                );
             }
             let mut open: Vec<(u8, u8)> = Vec::new();
             for t in triangles {

@@ -64,10 +64,7 @@ fn upward_pixels(camera: &PinholeCamera, background: &[f32]) -> Vec<Upward> {
             let i = y * w + x;
             if is_measured(background[i]) && -normals[i][1] > UPWARD {
                 let p = unproject(camera, x as f32, y as f32, background[i]);
-                pixels.push(Upward {
-                    point: Point3::from(p).cast(),
-                    normal: Vector3::from(normals[i]).cast(),
-                });
+                pixels.push(Upward { point: Point3::from(p).cast(), normal: Vector3::from(normals[i]).cast() });
             }
         }
     }
@@ -90,13 +87,13 @@ fn best_plane(pixels: &[Upward]) -> Option<(Vector3<f64>, Point3<f64>, f64)> {
 
 /// A pixel's normal averaged with the aligned ones of nearby pixels.
 fn smoothed_normal(pixels: &[Upward], center: &Upward) -> Vector3<f64> {
-    let near = pixels.iter().filter(|u| (u.point - center.point).norm() < 0.15 && u.normal.dot(&center.normal) > ALIGNED);
+    let near =
+        pixels.iter().filter(|u| (u.point - center.point).norm() < 0.15 && u.normal.dot(&center.normal) > ALIGNED);
     near.map(|u| u.normal).sum::<Vector3<f64>>().try_normalize(1e-9).unwrap_or(center.normal)
 }
 
 fn members<'a>(pixels: &'a [Upward], normal: &Vector3<f64>, point: &Point3<f64>, step: usize) -> Vec<&'a Upward> {
-    let belongs =
-        |u: &&Upward| (u.point - point).dot(normal).abs() < BAND && u.normal.dot(normal) > ALIGNED;
+    let belongs = |u: &&Upward| (u.point - point).dot(normal).abs() < BAND && u.normal.dot(normal) > ALIGNED;
     pixels.iter().step_by(step).filter(belongs).collect()
 }
 

@@ -35,7 +35,7 @@ const FULL_TURN_DEG: f64 = 340.0;
 /// Most frames in the joint optimisation; of more, evenly spaced ones.
 const MOST_KEY_FRAMES: usize = 150;
 /// Frames in which a voxel must have been seen well, in weight units, to be surface.
-const LEAST_WEIGHT: u16 = 48;
+const LEAST_WEIGHT: u16 = 6;
 
 /// What became of a pushed frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -210,7 +210,10 @@ impl Fuser {
             Ok(depth) => depth,
             Err(reason) => return Ok(self.drop_frame(frame, reason)),
         };
-        let view = { let cut = &prepared; self.clock.time("normals", || cut.view()) };
+        let view = {
+            let cut = &prepared;
+            self.clock.time("normals", || cut.view())
+        };
         let found = match self.locate(frame, &view) {
             Ok(found) => found,
             Err(reason) => return Ok(self.drop_frame(frame, reason)),
@@ -354,8 +357,8 @@ impl Fuser {
         report.triangles_raw = raw.triangles.len();
         let placed = self.place(&raw, &mut report);
         let mesh = raw.transformed(&placed);
-        let (settings, bottom) = (&self.settings, self.volume.as_ref().and_then(|v| v.bottom));
-        let (mesh, cleaned) = self.clock.time("clean up", || clean_up(mesh, settings, bottom));
+        let (settings, on_floor) = (&self.settings, self.volume.as_ref().is_some_and(|v| v.floor.is_some()));
+        let (mesh, cleaned) = self.clock.time("clean up", || clean_up(mesh, settings, on_floor));
         report.triangles = mesh.triangles.len();
         report.holes_filled = cleaned.holes;
         report.filled_percent = cleaned.filled_percent;

@@ -1,12 +1,12 @@
 //! Integration of a view into the signed distance field (Curless and Levoy 1996), block by block.
 
 use rayon::prelude::*;
-use toile_geometry::{Rigid, camera::PinholeCamera};
+use toile_geometry::Rigid;
 
 use crate::{
     FusionError,
     normals::dot,
-    tsdf::{Block, ColorBlock, SIDE, Tsdf, Voxel, WEIGHT_ONE},
+    tsdf::{Block, ColorBlock, SIDE, Tsdf, Voxel, WEIGHT_ONE, floor},
     view::{View, is_measured},
 };
 
@@ -34,13 +34,19 @@ struct Pixel {
 
 /// The voxel grid seen from the camera.
 struct Projection<'a> {
-    camera: &'a PinholeCamera,
+    /// Columns and rows of the image.
+    size: [f32; 2],
+    /// Depth by pixel, 0 where there is nothing to fuse, and one more 0 for points outside the image.
+    depth: &'a [f32],
     pixels: &'a [Pixel],
     colors: &'a [[u8; 3]],
-    /// Columns of camera_from_scan times voxel size, then the translation.
+    /// Camera coordinates of a voxel step along each axis, and of voxel 0.
     axes: [[f32; 3]; 3],
     origin: [f32; 3],
+    /// Pixel coordinates times depth from camera coordinates: fx, cx + ½, fy, cy + ½.
+    lens: [f32; 4],
     truncation: f32,
+    unit: f32,
 }
 
 /// Integrates `view` seen from `scan_from_camera`. Distances are to the plane of each pixel's surface element, so
@@ -51,24 +57,16 @@ struct Projection<'a> {
 /// [`FusionError::TooLarge`] where the block index would not fit.
 pub fn integrate(tsdf: &mut Tsdf, view: &View, scan_from_camera: &Rigid) -> Result<Touched, FusionError> {
     let pixels = surface_elements(view);
+    let mut depth: Vec<f32> = pixels.iter().map(|p| if p.weight > 0.0 { p.depth } else { 0.0 }).collect();
+    depth.push(0.0);
     let touched = touch_blocks(tsdf, view, scan_from_camera)?;
     let count = touched.iter().filter(|t| **t).count();
-    let camera_from_scan = scan_from_camera.inverse();
-    let rotation = camera_from_scan.rotation.to_rotation_matrix();
-    let size = tsdf.voxel_size();
-    let projection = Projection {
-        camera: &view.camera,
-        pixels: &pixels,
-        colors: if tsdf.has_color() { &view.colors } else { &[] },
-        axes: std::array::from_fn(|k| std::array::from_fn(|r| rotation[(r, k)] as f32 * size)),
-        origin: std::array::from_fn(|r| camera_from_scan.translation.vector[r] as f32),
-        truncation: tsdf.truncation(),
-    };
-    let unit = tsdf.unit();
+    let colors = if tsdf.has_color() { view.colors.as_slice() } else { &[] };
+    let projection = Projection::new(tsdf, view, scan_from_camera, &depth, &pixels, colors);
     if projection.colors.is_empty() {
         tsdf.blocks.par_chunks_mut(CHUNK).enumerate().for_each(|(c, blocks)| {
             for (k, block) in blocks.iter_mut().enumerate().filter(|(k, _)| touched[c * CHUNK + k]) {
-                update_block(&projection, tsdf.coords[c * CHUNK + k], block, None, unit);
+                projection.update(tsdf.coords[c * CHUNK + k], block, None);
             }
         });
     } else {
@@ -76,7 +74,7 @@ pub fn integrate(tsdf: &mut Tsdf, view: &View, scan_from_camera: &Rigid) -> Resu
         both.enumerate().for_each(|(c, (blocks, colors))| {
             let pairs = blocks.iter_mut().zip(colors).enumerate();
             for (k, (block, color)) in pairs.filter(|(k, _)| touched[c * CHUNK + k]) {
-                update_block(&projection, tsdf.coords[c * CHUNK + k], block, Some(color), unit);
+                projection.update(tsdf.coords[c * CHUNK + k], block, Some(color));
             }
         });
     }
@@ -116,7 +114,7 @@ fn touch_blocks(tsdf: &mut Tsdf, view: &View, scan_from_camera: &Rigid) -> Resul
         for s in 0..=steps {
             let scale = 1.0 + (band * (2.0 * s as f32 / steps as f32 - 1.0)) / depth;
             let q = p.map(|c| c * scale);
-            let b: [i32; 3] = std::array::from_fn(|k| ((dot(r[k], q) + t[k]) / block_size).floor() as i32);
+            let b: [i32; 3] = std::array::from_fn(|k| floor((dot(r[k], q) + t[k]) / block_size));
             if b != last {
                 marks.push(b);
                 last = b;
@@ -143,73 +141,103 @@ fn touch_blocks(tsdf: &mut Tsdf, view: &View, scan_from_camera: &Rigid) -> Resul
 
 /// Pixels that may be skipped so that neighbouring rays still fall at most a third of a block apart.
 fn sampling_stride(view: &View, block_size: f32) -> usize {
-    let nearest_third = view.depth.iter().filter(|d| is_measured(**d)).fold((0.0f64, 0usize), |(s, n), d| {
-        (s + f64::from(*d), n + 1)
-    });
+    let nearest_third =
+        view.depth.iter().filter(|d| is_measured(**d)).fold((0.0f64, 0usize), |(s, n), d| (s + f64::from(*d), n + 1));
     let mean = nearest_third.0 / nearest_third.1.max(1) as f64;
     ((f64::from(block_size) / 3.0 * view.camera.fx / mean.max(0.1)) as usize).clamp(1, 4)
 }
 
-fn update_block(
-    projection: &Projection,
-    coords: [i32; 3],
-    block: &mut Block,
-    mut color: Option<&mut ColorBlock>,
-    unit: f32,
-) {
-    let base = coords.map(|c| (c * SIDE as i32) as f32);
-    for z in 0..SIDE {
-        for y in 0..SIDE {
-            let v = [base[0], base[1] + y as f32, base[2] + z as f32];
+impl<'a> Projection<'a> {
+    fn new(
+        tsdf: &Tsdf,
+        view: &View,
+        scan_from_camera: &Rigid,
+        depth: &'a [f32],
+        pixels: &'a [Pixel],
+        colors: &'a [[u8; 3]],
+    ) -> Self {
+        let camera_from_scan = scan_from_camera.inverse();
+        let rotation = camera_from_scan.rotation.to_rotation_matrix();
+        let (size, camera) = (tsdf.voxel_size(), &view.camera);
+        Self {
+            size: [camera.width as f32, camera.height as f32],
+            depth,
+            pixels,
+            colors,
+            axes: std::array::from_fn(|k| std::array::from_fn(|r| rotation[(r, k)] as f32 * size)),
+            origin: std::array::from_fn(|r| camera_from_scan.translation.vector[r] as f32),
+            lens: [camera.fx as f32, camera.cx as f32 + 0.5, camera.fy as f32, camera.cy as f32 + 0.5],
+            truncation: tsdf.truncation(),
+            unit: tsdf.unit(),
+        }
+    }
+
+    fn update(&self, coords: [i32; 3], block: &mut Block, mut color: Option<&mut ColorBlock>) {
+        let base = coords.map(|c| (c * SIDE as i32) as f32);
+        for row in 0..SIDE * SIDE {
+            let (y, z) = (base[1] + (row % SIDE) as f32, base[2] + (row / SIDE) as f32);
             let start: [f32; 3] = std::array::from_fn(|r| {
-                projection.origin[r]
-                    + projection.axes[0][r] * v[0]
-                    + projection.axes[1][r] * v[1]
-                    + projection.axes[2][r] * v[2]
+                self.origin[r] + self.axes[0][r] * base[0] + self.axes[1][r] * y + self.axes[2][r] * z
             });
-            let row = z * 64 + y * 8;
+            let (index, range, any) = self.look_up(start);
+            if !any {
+                continue;
+            }
             for x in 0..SIDE {
-                let p: [f32; 3] = std::array::from_fn(|r| start[r] + projection.axes[0][r] * x as f32);
-                if let Some((distance, weight, pixel)) = measure(projection, p) {
-                    blend(&mut block[row + x], distance / unit, weight);
-                    if let Some(colors) = color.as_deref_mut().filter(|_| distance.abs() < COLOR_BAND * projection.truncation)
-                    {
-                        blend_color(&mut colors[row + x], projection.colors[pixel], weight);
-                    }
+                let depth = self.depth[index[x] as usize];
+                if depth == 0.0 || range[x] - depth > self.truncation {
+                    continue;
+                }
+                let pixel = &self.pixels[index[x] as usize];
+                let p: [f32; 3] = std::array::from_fn(|r| start[r] + self.axes[0][r] * x as f32);
+                let Some(distance) = self.distance(pixel, p) else { continue };
+                blend(&mut block[row * SIDE + x], distance / self.unit, pixel.weight);
+                if let Some(colors) = color.as_deref_mut().filter(|_| distance.abs() < COLOR_BAND * self.truncation) {
+                    blend_color(&mut colors[row * SIDE + x], self.colors[index[x] as usize], pixel.weight);
                 }
             }
         }
     }
-}
 
-/// Distance of a camera-frame point to the surface element on its ray, the element's weight and pixel.
-#[inline]
-fn measure(projection: &Projection, p: [f32; 3]) -> Option<(f32, f32, usize)> {
-    if p[2] <= 0.05 {
-        return None;
+    /// Pixel index (the extra one outside the image) and depth of the eight voxels of a row, and whether any of them
+    /// is not hidden.
+    #[inline]
+    fn look_up(&self, start: [f32; 3]) -> ([u32; SIDE], [f32; SIDE], bool) {
+        let outside = (self.depth.len() - 1) as u32;
+        let step = self.axes[0];
+        let [fx, cx, fy, cy] = self.lens;
+        let (mut index, mut range) = ([outside; SIDE], [0.0; SIDE]);
+        let (mut us, mut vs) = ([0.0f32; SIDE], [0.0f32; SIDE]);
+        for x in 0..SIDE {
+            let k = x as f32;
+            let z = start[2] + step[2] * k;
+            let inv = 1.0 / z;
+            range[x] = z;
+            us[x] = fx * (start[0] + step[0] * k) * inv + cx;
+            vs[x] = fy * (start[1] + step[1] * k) * inv + cy;
+        }
+        let mut any = false;
+        for x in 0..SIDE {
+            let (u, v) = (us[x], vs[x]);
+            if u >= 0.0 && v >= 0.0 && u < self.size[0] && v < self.size[1] && range[x] > 0.05 {
+                index[x] = v as u32 * self.size[0] as u32 + u as u32;
+                let depth = self.depth[index[x] as usize];
+                any |= depth > 0.0 && range[x] - depth <= self.truncation;
+            }
+        }
+        (index, range, any)
     }
-    let camera = projection.camera;
-    let inv = 1.0 / p[2];
-    let u = (camera.fx as f32 * p[0] * inv + camera.cx as f32 + 0.5).floor();
-    let v = (camera.fy as f32 * p[1] * inv + camera.cy as f32 + 0.5).floor();
-    if u < 0.0 || v < 0.0 || u >= camera.width as f32 || v >= camera.height as f32 {
-        return None;
+
+    /// Signed distance of a camera-frame point to a surface element, capped in front; `None` behind the band.
+    #[inline]
+    fn distance(&self, pixel: &Pixel, p: [f32; 3]) -> Option<f32> {
+        let t = self.truncation;
+        if p[2] - pixel.depth < -4.0 * t {
+            return Some(t);
+        }
+        let distance = dot(pixel.normal, p) - pixel.offset;
+        (distance > -t).then(|| distance.min(t))
     }
-    let i = v as usize * camera.width as usize + u as usize;
-    let pixel = &projection.pixels[i];
-    if pixel.weight == 0.0 {
-        return None;
-    }
-    let behind = p[2] - pixel.depth;
-    let t = projection.truncation;
-    if behind > t {
-        return None;
-    }
-    if behind < -4.0 * t {
-        return Some((t, pixel.weight, i));
-    }
-    let distance = dot(pixel.normal, p) - pixel.offset;
-    (distance > -t).then(|| (distance.min(t), pixel.weight, i))
 }
 
 #[inline]
@@ -217,7 +245,7 @@ fn blend(voxel: &mut Voxel, sdf: f32, weight: f32) {
     let old = f32::from(voxel.weight);
     let sum = old + weight;
     let value = (f32::from(voxel.sdf) * old + sdf * weight) / sum;
-    voxel.sdf = (value + 0.5).floor() as i16;
+    voxel.sdf = floor(value + 0.5) as i16;
     voxel.weight = (sum + 0.5).min(f32::from(u16::MAX)) as u16;
 }
 

@@ -72,9 +72,8 @@ impl MotionModel {
     /// Median of the last steps' rates about the axis, radians a second.
     fn rate(&self, axis: &Axis) -> f64 {
         let steps = self.poses.windows(2).rev().take(RATE_STEPS);
-        let mut rates: Vec<f64> = steps
-            .map(|w| axis.angle(&(w[1].1 * w[0].1.inverse())) / seconds(w[1].0 - w[0].0).max(1e-6))
-            .collect();
+        let mut rates: Vec<f64> =
+            steps.map(|w| axis.angle(&(w[1].1 * w[0].1.inverse())) / seconds(w[1].0 - w[0].0).max(1e-6)).collect();
         rates.sort_unstable_by(f64::total_cmp);
         rates.get(rates.len() / 2).copied().unwrap_or(0.0)
     }

@@ -9,29 +9,33 @@ const WINDOW: usize = 2;
 /// Neighbours farther than this many pixel widths in depth do not smooth each other.
 const SMOOTH_SLOPE: f32 = 4.0;
 /// A normal closer than this to the viewing ray's plane is not trusted (cosine).
-const MIN_COSINE: f32 = 0.12;
+const MIN_COSINE: f32 = 0.05;
+/// Neighbours farther than this many pixel widths in depth are no common surface.
+const JUMP_SLOPE: f32 = 16.0;
 
-/// Unit normals towards the camera from central differences of range-gated, averaged depth; zero where a neighbour
-/// is missing or the surface is seen edge-on. O(pixels).
+/// Unit normals towards the camera from central (at borders one-sided) differences of range-gated, averaged depth; zero
+/// where a direction has no neighbour or the surface is seen edge-on. O(pixels).
 pub fn normals_from_depth(camera: &PinholeCamera, depth: &[f32]) -> Vec<[f32; 3]> {
     let (w, h) = (camera.width as usize, camera.height as usize);
     let smooth = smoothed(camera, depth);
     let point = |x: usize, y: usize| unproject(camera, x as f32, y as f32, smooth[y * w + x]);
     let mut normals = vec![[0.0; 3]; depth.len()];
-    for y in 1..h.saturating_sub(1) {
-        for x in 1..w.saturating_sub(1) {
+    for y in 0..h {
+        for x in 0..w {
             let i = y * w + x;
-            let around = [i, i - 1, i + 1, i - w, i + w];
-            if !around.iter().all(|&j| is_measured(smooth[j])) {
+            if !is_measured(smooth[i]) {
                 continue;
             }
-            let du = sub(point(x + 1, y), point(x - 1, y));
-            let dv = sub(point(x, y + 1), point(x, y - 1));
-            let gate = 2.5 * 8.3 / camera.fx as f32 * smooth[i];
-            if du[2].abs() > gate || dv[2].abs() > gate {
-                continue;
+            let gate = JUMP_SLOPE / camera.fx as f32 * smooth[i];
+            let linked = |j: usize| is_measured(smooth[j]) && (smooth[j] - smooth[i]).abs() < gate;
+            let left = if x > 0 && linked(i - 1) { x - 1 } else { x };
+            let right = if x + 1 < w && linked(i + 1) { x + 1 } else { x };
+            let above = if y > 0 && linked(i - w) { y - 1 } else { y };
+            let below = if y + 1 < h && linked(i + w) { y + 1 } else { y };
+            if left < right && above < below {
+                let (du, dv) = (sub(point(right, y), point(left, y)), sub(point(x, below), point(x, above)));
+                normals[i] = facing(cross(dv, du), point(x, y));
             }
-            normals[i] = facing(cross(dv, du), point(x, y));
         }
     }
     normals

@@ -98,9 +98,8 @@ fn tile_ranges(tsdf: &Tsdf, camera: &PinholeCamera, scan_from_camera: &Rigid) ->
 /// outside to inside.
 fn march(tsdf: &Tsdf, origin: &Point3<f32>, direction: [f32; 3], near: f32, far: f32) -> Option<Hit> {
     let length = dot(direction, direction).sqrt();
-    let at = |t: f32| {
-        Point3::new(origin.x + direction[0] * t, origin.y + direction[1] * t, origin.z + direction[2] * t)
-    };
+    let at =
+        |t: f32| Point3::new(origin.x + direction[0] * t, origin.y + direction[1] * t, origin.z + direction[2] * t);
     let voxel = tsdf.voxel_size() / length;
     let (mut t, mut before): (f32, Option<(f32, f32)>) = (near, None);
     while t < far {

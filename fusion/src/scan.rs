@@ -42,7 +42,8 @@ impl Scan {
         let mut text = String::new();
         for frame in &self.trajectory {
             let (t, q) = (frame.scan_from_camera.translation.vector, frame.scan_from_camera.rotation);
-            let (seconds, nanos) = (frame.device_time_ns.div_euclid(1_000_000_000), frame.device_time_ns.rem_euclid(1_000_000_000));
+            let (seconds, nanos) =
+                (frame.device_time_ns.div_euclid(1_000_000_000), frame.device_time_ns.rem_euclid(1_000_000_000));
             let _ = writeln!(
                 text,
                 "{seconds}.{nanos:09} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9}",

@@ -111,8 +111,7 @@ fn borders_inside(tsdf: &Tsdf, slot: usize) -> bool {
 
 fn padded(tsdf: &Tsdf, slot: usize) -> (Vec<f32>, Vec<u16>) {
     let c = tsdf.coords[slot];
-    let around: Vec<u32> =
-        (0..8).map(|k| tsdf.slot([c[0] + (k & 1), c[1] + (k >> 1 & 1), c[2] + (k >> 2)])).collect();
+    let around: Vec<u32> = (0..8).map(|k| tsdf.slot([c[0] + (k & 1), c[1] + (k >> 1 & 1), c[2] + (k >> 2)])).collect();
     let mut values = Vec::with_capacity(PADDED.pow(3));
     let mut weights = Vec::with_capacity(PADDED.pow(3));
     for z in 0..PADDED {

@@ -16,13 +16,13 @@ use crate::{
 /// Points of a parallel task; fixed, so that sums do not depend on the number of threads.
 const CHUNK: usize = 512;
 /// About how many points the fine stage uses.
-const FINE_POINTS: usize = 6000;
+const FINE_POINTS: usize = 4000;
 /// Distance gates of the coarse iterations, metres.
 const COARSE_GATES: [f64; 7] = [0.10, 0.08, 0.06, 0.05, 0.04, 0.03, 0.03];
 /// Most fine iterations.
 const FINE_ITERATIONS: usize = 15;
 /// A step below this (metres at the subject's radius) has converged.
-const CONVERGED: f64 = 2e-6;
+const CONVERGED: f64 = 5e-6;
 
 /// A weighted point of a frame, camera frame.
 #[derive(Debug, Clone, Copy)]
@@ -143,9 +143,12 @@ pub fn register(tsdf: &Tsdf, points: &[Sample], start: &Rigid) -> Tracked {
         iterations: 0,
         converged: false,
     };
+    let mut cut = truncation * 0.9;
     for iteration in 0..FINE_ITERATIONS {
-        let spread = robust_spread(tsdf, points, &pose).unwrap_or(truncation / 3.0);
-        let cut = (4.7 * spread).clamp(0.002, truncation * 0.9);
+        if iteration < 4 {
+            let spread = robust_spread(tsdf, points, &pose).unwrap_or(truncation / 3.0);
+            cut = (4.7 * spread).clamp(0.002, truncation * 0.9);
+        }
         let center = centroid(points, &pose);
         let system = accumulate(points, &pose, &center, |q, n, _| {
             let (r, normal) = signed_distance(tsdf, q, n)?;
@@ -181,8 +184,11 @@ fn signed_distance(tsdf: &Tsdf, q: &Point3<f32>, normal: [f32; 3]) -> Option<(f6
 
 /// Robust standard deviation of the distances (1.4826 × median absolute value); `None` of fewer than 50.
 fn robust_spread(tsdf: &Tsdf, points: &[Sample], pose: &Rigid) -> Option<f64> {
-    let mut all: Vec<f64> =
-        distances(tsdf, &points.iter().step_by(4).copied().collect::<Vec<_>>(), pose).into_iter().flatten().map(f64::abs).collect();
+    let mut all: Vec<f64> = distances(tsdf, &points.iter().step_by(4).copied().collect::<Vec<_>>(), pose)
+        .into_iter()
+        .flatten()
+        .map(f64::abs)
+        .collect();
     if all.len() < 50 {
         return None;
     }

@@ -149,12 +149,7 @@ impl Tsdf {
         let (c, f) = self.cell_at(p)?;
         let unit = self.unit();
         let lerp = |a: f32, b: f32, t: f32| a + (b - a) * t;
-        let x = [
-            lerp(c[0], c[1], f[0]),
-            lerp(c[2], c[3], f[0]),
-            lerp(c[4], c[5], f[0]),
-            lerp(c[6], c[7], f[0]),
-        ];
+        let x = [lerp(c[0], c[1], f[0]), lerp(c[2], c[3], f[0]), lerp(c[4], c[5], f[0]), lerp(c[6], c[7], f[0])];
         let y = [lerp(x[0], x[1], f[1]), lerp(x[2], x[3], f[1])];
         let dx = lerp(lerp(c[1] - c[0], c[3] - c[2], f[1]), lerp(c[5] - c[4], c[7] - c[6], f[1]), f[2]);
         let dy = lerp(x[1] - x[0], x[3] - x[2], f[2]);
@@ -181,9 +176,8 @@ impl Tsdf {
     fn cell_at(&self, p: &Point3<f32>) -> Option<([f32; 8], [f32; 3])> {
         let inv = 1.0 / self.voxel_size;
         let g = [p.x * inv, p.y * inv, p.z * inv];
-        let base = g.map(|c| c.floor());
-        let f = [g[0] - base[0], g[1] - base[1], g[2] - base[2]];
-        let v = base.map(|c| c as i32);
+        let v = g.map(floor);
+        let f = [g[0] - v[0] as f32, g[1] - v[1] as f32, g[2] - v[2] as f32];
         let mut corners = [0.0; 8];
         if v.iter().all(|c| c & 7 < 7) {
             let slot = self.slot(v.map(|c| c >> 3));
@@ -260,6 +254,13 @@ impl BlockIndex {
         *self = grown;
         Ok(())
     }
+}
+
+/// Largest integer not above `x`, without the library call that plain x86-64 needs for it.
+#[inline]
+pub(crate) fn floor(x: f32) -> i32 {
+    let i = x as i32;
+    i - i32::from(x < i as f32)
 }
 
 /// Index of a voxel in its block.

@@ -24,6 +24,7 @@
 
 pub mod bvh;
 pub mod camera;
+pub mod color_transfer;
 pub mod components;
 pub mod decimate;
 pub mod error;

@@ -1,0 +1,137 @@
+//! Connected pieces of a mesh and repairs that make it a manifold.
+
+use crate::{
+    Mesh,
+    topology::{Edges, VertexTriangles, vertex_components},
+};
+
+/// The connected piece with the largest area, and how many pieces there were.
+pub fn largest_component(mesh: &Mesh) -> (Mesh, usize) {
+    let (label, count) = vertex_components(mesh.positions.len(), &mesh.triangles);
+    let mut areas = vec![0.0f64; count];
+    let mut pieces = vec![false; count];
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(t).map(|p| p.cast::<f64>());
+        let piece = label[triangle[0] as usize] as usize;
+        areas[piece] += (b - a).cross(&(c - a)).norm() * 0.5;
+        pieces[piece] = true;
+    }
+    let largest = (0..count).max_by(|&a, &b| areas[a].total_cmp(&areas[b]).then(b.cmp(&a))).unwrap_or(0) as u32;
+    let (kept, _) = mesh.filter_triangles(|t| label[mesh.triangles[t][0] as usize] == largest);
+    (kept, pieces.iter().filter(|p| **p).count())
+}
+
+/// Drops degenerate triangles and those on edges that more than two triangles share, then parts vertices whose
+/// triangles form more than one fan. Afterwards every edge has one or two triangles and every vertex one fan.
+pub fn make_manifold(mesh: &Mesh) -> Mesh {
+    let (mut mesh, _) = mesh.filter_triangles(|t| {
+        let [a, b, c] = mesh.triangles[t];
+        a != b && b != c && c != a
+    });
+    loop {
+        let edges = Edges::new(&mesh.triangles);
+        if edges.uses.iter().all(|&u| u <= 2) {
+            break;
+        }
+        let bad = |t: usize| edges.of_triangle[t].iter().any(|&e| edges.uses[e as usize] > 2);
+        mesh = mesh.filter_triangles(|t| !bad(t)).0;
+    }
+    part_fans(mesh)
+}
+
+fn part_fans(mesh: Mesh) -> Mesh {
+    let around = VertexTriangles::new(mesh.positions.len(), &mesh.triangles);
+    let mut triangles = mesh.triangles.clone();
+    let mut source: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    for v in 0..mesh.positions.len() {
+        let fans = fans(&mesh.triangles, around.of(v), v as u32);
+        for fan in fans.iter().skip(1) {
+            let copy = source.len() as u32;
+            source.push(v as u32);
+            for &t in fan {
+                for corner in &mut triangles[t as usize] {
+                    if *corner == v as u32 {
+                        *corner = copy;
+                    }
+                }
+            }
+        }
+    }
+    if source.len() == mesh.positions.len() { mesh } else { mesh.gather(&source, triangles) }
+}
+
+/// Groups of a vertex's triangles that hang together by edges at the vertex.
+fn fans(triangles: &[[u32; 3]], around: &[u32], v: u32) -> Vec<Vec<u32>> {
+    let mut left: Vec<u32> = around.to_vec();
+    let mut groups = Vec::new();
+    while let Some(first) = left.first().copied() {
+        left.remove(0);
+        let mut group = vec![first];
+        let mut at = 0;
+        while at < group.len() {
+            let t = triangles[group[at] as usize];
+            let linked = |s: &u32| triangles[*s as usize].iter().any(|c| *c != v && t.contains(c));
+            let (joined, rest): (Vec<u32>, Vec<u32>) = left.iter().partition(|s| linked(s));
+            group.extend(joined);
+            left = rest;
+            at += 1;
+        }
+        groups.push(group);
+    }
+    groups
+}
+
+/// Cuts off triangles with two or three open sides, `passes` times, so that ragged borders become smoother.
+pub fn trim_border(mesh: &Mesh, passes: usize) -> Mesh {
+    let mut mesh = mesh.clone();
+    for _ in 0..passes {
+        let edges = Edges::new(&mesh.triangles);
+        let open = |t: usize| edges.of_triangle[t].iter().filter(|&&e| edges.uses[e as usize] == 1).count();
+        let (trimmed, _) = mesh.filter_triangles(|t| open(t) < 2);
+        if trimmed.triangles.len() == mesh.triangles.len() {
+            break;
+        }
+        mesh = trimmed;
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+
+    #[test]
+    fn a_bow_tie_is_parted_and_the_larger_side_kept() {
+        let p = |x: f32, y: f32| Point3::new(x, y, 0.0);
+        let mesh = Mesh::new(
+            vec![p(0.0, 0.0), p(1.0, 0.0), p(0.0, 1.0), p(-2.0, 0.0), p(0.0, -2.0)],
+            vec![[0, 1, 2], [0, 3, 4]],
+        );
+        let parted = make_manifold(&mesh);
+        assert_eq!(parted.positions.len(), 6);
+        let (largest, count) = largest_component(&parted);
+        assert_eq!((largest.positions.len(), count), (3, 2));
+        assert!((largest.area() - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_third_triangle_on_an_edge_goes() {
+        let p = |x: f32, y: f32, z: f32| Point3::new(x, y, z);
+        let mesh = Mesh::new(
+            vec![
+                p(0.0, 0.0, 0.0),
+                p(1.0, 0.0, 0.0),
+                p(0.0, 1.0, 0.0),
+                p(0.0, -1.0, 0.0),
+                p(0.0, 0.0, 1.0),
+                p(2.0, 1.0, 0.0),
+            ],
+            vec![[0, 1, 2], [1, 0, 3], [0, 1, 4], [1, 5, 2]],
+        );
+        let fixed = make_manifold(&mesh);
+        assert!(Edges::new(&fixed.triangles).uses.iter().all(|&u| u <= 2));
+        assert_eq!(fixed.triangles.len(), 1);
+    }
+}

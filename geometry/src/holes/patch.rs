@@ -1,0 +1,156 @@
+//! A patch in a hole: its border comes first and stays; edges are split and flipped until it is evenly meshed.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Point3;
+
+/// Rounds of splitting and flipping.
+const ROUNDS: usize = 12;
+/// An inner edge longer than this many border edges is split.
+const LONG: f64 = 1.5;
+/// Most vertices of a patch.
+const MOST_VERTICES: usize = 20_000;
+
+/// Vertices (border first, in its order) and triangles of a patch.
+#[derive(Debug, Clone)]
+pub(super) struct Patch {
+    pub positions: Vec<Point3<f64>>,
+    pub triangles: Vec<[u32; 3]>,
+    pub border: usize,
+}
+
+impl Patch {
+    pub(super) fn new(border: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Self {
+        Self { border: border.len(), positions: border, triangles }
+    }
+
+    /// Splits and flips until inner edges are about as long as the border's. `blocked` names border vertex pairs
+    /// that are edges of the mesh around.
+    pub(super) fn refine(&mut self, blocked: &dyn Fn(usize, usize) -> bool) {
+        let target = self.border_edge() * LONG;
+        for _ in 0..ROUNDS {
+            let split = self.split_long(target);
+            let mut flips = 0;
+            for _ in 0..8 {
+                let n = self.flip_edges(blocked);
+                flips += n;
+                if n == 0 {
+                    break;
+                }
+            }
+            if split > 0 {
+                self.even_out();
+            }
+            if split == 0 && flips == 0 || self.positions.len() > MOST_VERTICES {
+                break;
+            }
+        }
+    }
+
+    fn border_edge(&self) -> f64 {
+        let n = self.border;
+        (0..n).map(|i| (self.positions[i] - self.positions[(i + 1) % n]).norm()).sum::<f64>() / n.max(1) as f64
+    }
+
+    /// Inner edges with their two triangles.
+    fn inner_edges(&self) -> BTreeMap<(u32, u32), [usize; 2]> {
+        let mut sides: BTreeMap<(u32, u32), [usize; 2]> = BTreeMap::new();
+        for (t, tri) in self.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (tri[k], tri[(k + 1) % 3]);
+                sides.entry((a.min(b), a.max(b))).and_modify(|s| s[1] = t).or_insert([t, usize::MAX]);
+            }
+        }
+        sides.retain(|_, s| s[1] != usize::MAX);
+        sides
+    }
+
+    fn split_long(&mut self, target: f64) -> usize {
+        let length = |e: &(u32, u32)| (self.positions[e.0 as usize] - self.positions[e.1 as usize]).norm();
+        let mut long: Vec<(f64, (u32, u32), [usize; 2])> =
+            self.inner_edges().into_iter().map(|(e, t)| (length(&e), e, t)).filter(|l| l.0 > target).collect();
+        long.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut touched = vec![false; self.triangles.len()];
+        let mut count = 0;
+        for (_, (a, b), sides) in long {
+            if sides.iter().any(|&t| touched[t]) || self.positions.len() > MOST_VERTICES {
+                continue;
+            }
+            let middle = nalgebra::center(&self.positions[a as usize], &self.positions[b as usize]);
+            let m = self.positions.len() as u32;
+            self.positions.push(middle);
+            for t in sides {
+                touched[t] = true;
+                let old = self.triangles[t];
+                self.triangles[t] = old.map(|v| if v == a { m } else { v });
+                self.triangles.push(old.map(|v| if v == b { m } else { v }));
+                touched.push(true);
+            }
+            count += 1;
+        }
+        count
+    }
+
+    /// Flips inner edges whose opposite angles sum to more than 180°.
+    fn flip_edges(&mut self, blocked: &dyn Fn(usize, usize) -> bool) -> usize {
+        let inner = self.inner_edges();
+        let mut edges: BTreeSet<(u32, u32)> = self
+            .triangles
+            .iter()
+            .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
+            .map(|(a, b)| (a.min(b), a.max(b)))
+            .collect();
+        let mut touched = vec![false; self.triangles.len()];
+        let mut count = 0;
+        for ((a, b), [s, t]) in inner {
+            if touched[s] || touched[t] {
+                continue;
+            }
+            let (Some((c, ca, cb)), Some((d, _, _))) = (self.opposite(s, a, b), self.opposite(t, a, b)) else {
+                continue;
+            };
+            let new = (c.min(d), c.max(d));
+            let both_border = (c as usize) < self.border && (d as usize) < self.border;
+            if c == d || edges.contains(&new) || (both_border && blocked(c as usize, d as usize)) {
+                continue;
+            }
+            if self.angle(c, a, b) + self.angle(d, a, b) <= std::f64::consts::PI + 1e-6 {
+                continue;
+            }
+            edges.remove(&(a, b));
+            edges.insert(new);
+            // (ca, cb) is the edge as triangle s runs along it: ca → cb → c.
+            self.triangles[s] = [ca, d, c];
+            self.triangles[t] = [d, cb, c];
+            touched[s] = true;
+            touched[t] = true;
+            count += 1;
+        }
+        count
+    }
+
+    /// The corner of triangle `t` opposite to edge ab, and the edge in the triangle's direction.
+    fn opposite(&self, t: usize, a: u32, b: u32) -> Option<(u32, u32, u32)> {
+        let tri = self.triangles[t];
+        (0..3).find(|&k| tri[k] != a && tri[k] != b).map(|k| (tri[k], tri[(k + 1) % 3], tri[(k + 2) % 3]))
+    }
+
+    fn angle(&self, at: u32, a: u32, b: u32) -> f64 {
+        let p = self.positions[at as usize];
+        (self.positions[a as usize] - p).angle(&(self.positions[b as usize] - p))
+    }
+
+    /// Moves inner vertices to the mean of their neighbours.
+    fn even_out(&mut self) {
+        let neighbors = crate::topology::VertexNeighbors::new(self.positions.len(), &self.triangles);
+        for _ in 0..3 {
+            for v in self.border..self.positions.len() {
+                let around = neighbors.of(v);
+                if !around.is_empty() {
+                    let sum: nalgebra::Vector3<f64> = around.iter().map(|&n| self.positions[n as usize].coords).sum();
+                    self.positions[v] = Point3::from(sum / around.len() as f64);
+                }
+            }
+        }
+    }
+}
