@@ -13,7 +13,7 @@ use std::{
 };
 
 use nalgebra::Point3;
-use toile_character::{Pose, SkinWeights, Skeleton};
+use toile_character::{Pose, Skeleton, SkinWeights};
 use toile_garments::{ExtractSettings, GarmentType, StackSettings, Take, extract, stack};
 use toile_geometry::{Mesh, ply};
 

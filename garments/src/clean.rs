@@ -1,18 +1,24 @@
 //! Islands dropped, holes closed.
 
+use std::collections::VecDeque;
+
 use nalgebra::Point3;
 use toile_geometry::{
     Mesh,
-    topology::{boundary_loops, loop_length, vertex_components},
+    topology::{Edges, boundary_loops, loop_length, vertex_components},
     triangle::ray_hit,
 };
 
-use crate::{ExtractSettings, labels::Labels, scan_graph::ScanGraph};
+use crate::{ExtractSettings, evidence::Evidence, labels::Labels, scan_graph::ScanGraph};
 
 /// An island of old surface inside the garment is turned new up to this share of `least_area`, whatever it says.
 const ISLAND_SHARE: f32 = 0.2;
 /// Loops with more vertices than this are not closed: triangulating costs the cube.
-const MOST_RIM_VERTICES: usize = 160;
+const MOST_RIM_VERTICES: usize = 450;
+/// A vertex whose normal is further than this (cosine) from the earlier surface's lies on a step.
+const STEP_FACING: f32 = 0.6;
+/// A patch or hole belongs to the garment when this share of its surroundings does.
+const SURROUNDED: f64 = 0.95;
 
 /// Labels with small islands of either kind turned over, and of the garment's pieces only the large ones kept.
 /// Returns how many pieces are left.
@@ -39,6 +45,70 @@ fn flip(labels: &mut Labels, v: usize) {
     labels.confidence[v] = 0.5;
 }
 
+/// Takes the step between a hem and what lies below it off the garment: from its border inward, at most `depth`
+/// metres, every vertex that faces away from the earlier surface. The hem is the ridge where that step begins.
+pub fn peel_steps(scan: &Mesh, graph: &ScanGraph, evidence: &Evidence, labels: &mut Labels, depth: f32) {
+    let rim = open_vertices(scan);
+    let mut reached = vec![f32::INFINITY; graph.len()];
+    let mut queue: VecDeque<u32> = (0..graph.len() as u32)
+        .filter(|&v| {
+            let old = |n: u32| !labels.garment[n as usize];
+            !old(v) && (rim[v as usize] || graph.neighbors.of(v as usize).iter().any(|&n| old(n)))
+        })
+        .collect();
+    queue.iter().for_each(|&v| reached[v as usize] = 0.0);
+    while let Some(v) = queue.pop_front() {
+        if evidence.facing[v as usize] > STEP_FACING {
+            continue;
+        }
+        labels.garment[v as usize] = false;
+        for &n in graph.neighbors.of(v as usize) {
+            let far = reached[v as usize] + (scan.positions[n as usize] - scan.positions[v as usize]).norm();
+            if labels.garment[n as usize] && far < depth && far < reached[n as usize] {
+                reached[n as usize] = far;
+                queue.push_back(n);
+            }
+        }
+    }
+}
+
+/// True for the vertices on open edges.
+fn open_vertices(mesh: &Mesh) -> Vec<bool> {
+    let edges = Edges::new(&mesh.triangles);
+    let mut open = vec![false; mesh.positions.len()];
+    for (e, _) in edges.vertices.iter().zip(&edges.uses).filter(|(_, u)| **u == 1) {
+        e.iter().for_each(|&v| open[v as usize] = true);
+    }
+    open
+}
+
+/// Filled vertices take part in the garment only where a patch of them is surrounded by it: below a skirt's hem the
+/// scan is closed by a membrane that is no cloth.
+pub fn settle_filled(graph: &ScanGraph, labels: &mut Labels) {
+    let filled = |v: usize| graph.filled[v] > 0.5;
+    let (patch, areas) = graph.components(filled);
+    let mut around = vec![[0u32; 2]; areas.len()];
+    for v in (0..graph.len()).filter(|&v| filled(v)) {
+        for &n in graph.neighbors.of(v).iter().filter(|&&n| !filled(n as usize)) {
+            around[patch[v] as usize][usize::from(labels.garment[n as usize])] += 1;
+        }
+    }
+    for v in (0..graph.len()).filter(|&v| filled(v)) {
+        let [old, new] = around[patch[v] as usize];
+        labels.garment[v] = f64::from(new) > SURROUNDED * f64::from(old + new);
+    }
+}
+
+/// Closes the scan's own holes whose rims belong to the garment all round, unless a bone passes through them: what
+/// another garment, an arm or the camera's angle hid. Returns how many were closed.
+pub fn close_hidden(mesh: &mut Mesh, garment: &[bool], bones: &[[Point3<f32>; 2]]) -> usize {
+    let belongs = |rim: &[u32]| {
+        let inside = rim.iter().filter(|&&v| garment[v as usize]).count();
+        inside as f64 > SURROUNDED * rim.len() as f64
+    };
+    fill_where(mesh, |mesh, rim| belongs(rim) && !bones.iter().any(|b| passes(&mesh.positions, rim, b)))
+}
+
 /// The mesh without pieces smaller than `share` of its largest one (by area).
 pub fn keep_large_pieces(mesh: &Mesh, share: f32) -> Mesh {
     let (set, count) = vertex_components(mesh.positions.len(), &mesh.triangles);
@@ -54,10 +124,15 @@ pub fn keep_large_pieces(mesh: &Mesh, share: f32) -> Mesh {
 /// Closes boundary loops up to `longest` (metres) unless one of `bones` passes through them. New triangles are few;
 /// remeshing refines them. Marks the rims of closed holes in the attribute `filled` and returns how many were closed.
 pub fn fill_holes(mesh: &mut Mesh, bones: &[[Point3<f32>; 2]], longest: f32) -> usize {
+    fill_where(mesh, |mesh, rim| {
+        loop_length(&mesh.positions, rim) <= longest && !bones.iter().any(|b| passes(&mesh.positions, rim, b))
+    })
+}
+
+fn fill_where(mesh: &mut Mesh, wanted: impl Fn(&Mesh, &[u32]) -> bool) -> usize {
     let mut closed = 0;
     for rim in boundary_loops(&mesh.triangles) {
-        let short = rim.len() >= 3 && rim.len() <= MOST_RIM_VERTICES && loop_length(&mesh.positions, &rim) <= longest;
-        if !short || bones.iter().any(|b| passes(&mesh.positions, &rim, b)) {
+        if rim.len() < 3 || rim.len() > MOST_RIM_VERTICES || !wanted(mesh, &rim) {
             continue;
         }
         // The loop runs along the surface's triangles; the filling runs against it.
@@ -113,8 +188,6 @@ fn triangulate(positions: &[Point3<f32>], polygon: &[u32]) -> Vec<[u32; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use toile_geometry::topology::Edges;
-
     use super::*;
 
     fn tube_end() -> Mesh {

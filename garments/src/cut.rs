@@ -18,8 +18,12 @@ pub fn smooth_field(graph: &ScanGraph, positions: &[Point3<f32>], inside: &[bool
     let mean_square = (squares / graph.edges.len().max(1) as f64) as f32;
     // Moving half of the value by one edge adds a quarter of the edge's square to the variance along each direction.
     let steps = (4.0 * deviation * deviation / mean_square.max(1e-9)).ceil().min(200.0) as usize;
-    let weights: Vec<f32> =
-        graph.edges.iter().zip(&graph.dual_lengths).map(|(e, d)| (d / length(positions, e).max(1e-6)).max(0.05)).collect();
+    let weights: Vec<f32> = graph
+        .edges
+        .iter()
+        .zip(&graph.dual_lengths)
+        .map(|(e, d)| (d / length(positions, e).max(1e-6)).max(0.05))
+        .collect();
     for _ in 0..steps {
         let mut sums = vec![[0.0f32; 2]; field.len()];
         for (&[i, j], &w) in graph.edges.iter().zip(&weights) {
@@ -131,9 +135,8 @@ mod tests {
     /// A flat grid of n × n squares of 10 mm, with x as attribute.
     fn sheet(n: u32) -> Mesh {
         let at = |i: u32, j: u32| i * (n + 1) + j;
-        let positions: Vec<Point3<f32>> = (0..=n)
-            .flat_map(|i| (0..=n).map(move |j| Point3::new(i as f32 * 0.01, j as f32 * 0.01, 0.0)))
-            .collect();
+        let positions: Vec<Point3<f32>> =
+            (0..=n).flat_map(|i| (0..=n).map(move |j| Point3::new(i as f32 * 0.01, j as f32 * 0.01, 0.0))).collect();
         let triangles = (0..n)
             .flat_map(|i| (0..n).map(move |j| (i, j)))
             .flat_map(|(i, j)| {

@@ -2,7 +2,11 @@
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-use toile_geometry::{Mesh, bvh::Bvh, topology::VertexNeighbors};
+use toile_geometry::{
+    Mesh,
+    bvh::{Bvh, Closest},
+    topology::VertexNeighbors,
+};
 
 use crate::{
     ExtractSettings, Take,
@@ -35,6 +39,8 @@ pub struct Evidence {
     pub height: Vec<f32>,
     /// Colour difference from the nearest place of the earlier surface; NaN where either was not seen.
     pub color: Vec<f32>,
+    /// Cosine between the scan's normal and the earlier surface's: small where a hem's edge drops to what is below.
+    pub facing: Vec<f32>,
     /// Shares of the body parts at the closest body vertex.
     pub parts: Vec<[f32; PART_COUNT]>,
     /// Distance from the body, metres.
@@ -48,10 +54,11 @@ pub struct Evidence {
 /// Measures a take.
 pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Evidence {
     let before = Before::new(take.previous);
-    let (height, color): (Vec<f32>, Vec<f32>) = (0..graph.len())
+    let compared: Vec<[f32; 3]> = (0..graph.len())
         .into_par_iter()
         .map(|v| before.compare(&take.scan.positions[v], &graph.normals[v], graph.lab.get(v), settings))
-        .unzip();
+        .collect();
+    let column = |k: usize| compared.iter().map(|row| row[k]).collect::<Vec<f32>>();
     let body = Bvh::new(&take.body.positions, &take.body.triangles);
     let shares = part_shares(take.weights);
     let (parts, body_distance): (Vec<_>, Vec<f32>) = take
@@ -66,8 +73,9 @@ pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Ev
             None => ([0.0; PART_COUNT], f32::INFINITY),
         })
         .unzip();
-    let color = color.into_iter().zip(&graph.filled).map(|(c, &f)| if f > 0.5 { f32::NAN } else { c }).collect();
-    let mut evidence = Evidence { height, color, parts, body_distance, height_noise: 0.0, color_noise: 0.0 };
+    let color = column(1).into_iter().zip(&graph.filled).map(|(c, &f)| if f > 0.5 { f32::NAN } else { c }).collect();
+    let (height, facing) = (column(0), column(2));
+    let mut evidence = Evidence { height, color, facing, parts, body_distance, height_noise: 0.0, color_noise: 0.0 };
     evidence.estimate_noise();
     evidence
 }
@@ -134,6 +142,7 @@ struct Before<'a> {
     mesh: &'a Mesh,
     bvh: Bvh,
     normals: Vec<Vector3<f32>>,
+    vertex_normals: Vec<Vector3<f32>>,
     lab: Vec<[f32; 3]>,
     neighbors: VertexNeighbors,
     filled: Option<&'a Vec<f32>>,
@@ -145,30 +154,40 @@ impl<'a> Before<'a> {
             mesh,
             bvh: Bvh::new(&mesh.positions, &mesh.triangles),
             normals: mesh.triangle_normals(),
+            vertex_normals: mesh.vertex_normals(),
             lab: mesh.colors.iter().map(|&c| color::lab(c)).collect(),
             neighbors: VertexNeighbors::new(mesh.positions.len(), &mesh.triangles),
             filled: mesh.attributes.get("filled"),
         }
     }
 
-    /// Signed height of `p` over the closest surface that faces the same way, and the colour difference there.
+    /// Signed height of `p` over the closest surface that faces the same way, the colour difference there, and the
+    /// cosine between the normals.
     fn compare(
         &self,
         p: &Point3<f32>,
         normal: &Vector3<f32>,
         lab: Option<&[f32; 3]>,
         settings: &ExtractSettings,
-    ) -> (f32, f32) {
+    ) -> [f32; 3] {
         let facing = |t: u32| self.normals[t as usize].dot(normal) > 0.2;
         let hit = self.bvh.closest_where(p, settings.reach, facing);
-        let Some(hit) = hit.or_else(|| self.bvh.closest(p, settings.reach)) else { return (f32::INFINITY, f32::NAN) };
+        let Some(hit) = hit.or_else(|| self.bvh.closest(p, settings.reach)) else {
+            return [f32::INFINITY, f32::NAN, 1.0];
+        };
         let sign = if (p - hit.point).dot(&self.normals[hit.triangle as usize]) >= 0.0 { 1.0 } else { -1.0 };
         let corner = self.mesh.triangles[hit.triangle as usize][largest(hit.barycentric)];
         let color = match lab {
             Some(lab) if !self.lab.is_empty() => self.least_difference(corner, lab, settings.color_search),
             _ => f32::NAN,
         };
-        (sign * hit.distance, color)
+        [sign * hit.distance, color, self.smooth_normal(&hit).dot(normal)]
+    }
+
+    fn smooth_normal(&self, hit: &Closest) -> Vector3<f32> {
+        let corners = self.mesh.triangles[hit.triangle as usize];
+        let sum = corners.iter().zip(hit.barycentric).map(|(&v, w)| self.vertex_normals[v as usize] * w).sum();
+        Vector3::try_normalize(&sum, 1e-12).unwrap_or(self.normals[hit.triangle as usize])
     }
 
     /// Least colour difference from the surface within `radius` of vertex `center`.

@@ -2,10 +2,11 @@
 
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
-use toile_character::{Joint, Pose, SkinWeights, Skeleton, joint::JOINTS};
+use toile_character::{Joint, Pose, Skeleton, SkinWeights, joint::JOINTS};
 use toile_geometry::{
     Mesh,
     bvh::Bvh,
+    remesh,
     topology::{boundary_loops, loop_length},
 };
 
@@ -63,11 +64,9 @@ impl std::fmt::Display for Warning {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::NothingNew => write!(f, "no new garment was found in this take: was one put on before it?"),
-            Self::TakenOff(area) => write!(
-                f,
-                "{:.0} cm² of the scan lie inside what was worn before: was something taken off?",
-                area * 1e4
-            ),
+            Self::TakenOff(area) => {
+                write!(f, "{:.0} cm² of the scan lie inside what was worn before: was something taken off?", area * 1e4)
+            }
             Self::SeveralPieces(n) => {
                 write!(f, "the garment has {n} separate pieces: were two put on at once? They are kept as one layer")
             }
@@ -130,6 +129,9 @@ pub fn extract(
     let evidence = evidence::measure(take, &graph, settings);
     progress(0.3);
     let (garment_type, mut labels) = label(take, &graph, &evidence, settings);
+    clean::drop_islands(&graph, &mut labels, settings);
+    clean::settle_filled(&graph, &mut labels);
+    clean::peel_steps(take.scan, &graph, &evidence, &mut labels, settings.hem_depth);
     let pieces = clean::drop_islands(&graph, &mut labels, settings);
     progress(0.6);
     let in_take = garment_mesh(take, &graph, &labels, settings);
@@ -246,9 +248,12 @@ fn garment_mesh(take: &Take, graph: &ScanGraph, labels: &Labels, settings: &Extr
     scan.attributes.retain(|name, _| name == "filled");
     scan.attributes.entry("filled".into()).or_insert_with(|| vec![0.0; graph.len()]);
     scan.attributes.insert("confidence".into(), labels.confidence.clone());
+    let bones = bones(take);
+    clean::close_hidden(&mut scan, &labels.garment, &bones);
     let mut mesh = cut::cut_positive(&scan, &field);
     mesh = clean::keep_large_pieces(&mesh, settings.piece_share);
-    clean::fill_holes(&mut mesh, &bones(take), settings.hole_rim.min(OPENING));
+    clean::fill_holes(&mut mesh, &bones, settings.hole_rim);
+    mesh = remesh::isotropic(&mesh, settings.edge_length);
     mesh.recompute_normals();
     mesh
 }
@@ -256,10 +261,7 @@ fn garment_mesh(take: &Take, graph: &ScanGraph, labels: &Labels, settings: &Extr
 /// Segments from each joint to its parent.
 fn bones(take: &Take) -> Vec<[Point3<f32>; 2]> {
     let at = take.pose.joint_positions(take.skeleton);
-    JOINTS
-        .iter()
-        .filter_map(|j| Some([at[j.parent()?.index()].cast::<f32>(), at[j.index()].cast::<f32>()]))
-        .collect()
+    JOINTS.iter().filter_map(|j| Some([at[j.parent()?.index()].cast::<f32>(), at[j.index()].cast::<f32>()])).collect()
 }
 
 fn warnings(graph: &ScanGraph, evidence: &Evidence, garment: &Mesh, pieces: usize) -> Vec<Warning> {

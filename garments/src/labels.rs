@@ -5,12 +5,7 @@
 
 use toile_geometry::max_flow::GraphCut;
 
-use crate::{
-    ExtractSettings, GarmentType, color,
-    color::Histogram,
-    evidence::Evidence,
-    scan_graph::ScanGraph,
-};
+use crate::{ExtractSettings, GarmentType, color, color::Histogram, evidence::Evidence, scan_graph::ScanGraph};
 
 /// Capacities are integers: one unit is this many square metres times nats.
 const UNIT: f32 = 1e-9;

@@ -17,12 +17,15 @@ pub struct ExtractSettings {
     pub rounds: usize,
     /// Standard deviation of the smoothing that rounds the hem, metres. Default 0.008.
     pub hem_smoothing: f32,
+    /// The step at a hem is taken off over at most this width, metres. Default 0.03.
+    pub hem_depth: f32,
     /// Least area of a garment, square metres; less is "no new garment". Default 0.006.
     pub least_area: f32,
     /// A separate piece is kept when it has this share of the largest one's area (socks and gloves come in twos).
     /// Default 0.2.
     pub piece_share: f32,
-    /// Holes with a rim up to this length are closed, unless the body passes through them, metres. Default 0.3.
+    /// Holes in the garment with a rim up to this length are closed, unless the body passes through them, metres.
+    /// Default 0.15.
     pub hole_rim: f32,
     /// Distance over which skin weights become those of the surroundings, metres: cloth this far off the body follows
     /// no single limb. Default 0.03.
@@ -39,9 +42,10 @@ impl Default for ExtractSettings {
             color_search: 0.01,
             rounds: 3,
             hem_smoothing: 0.008,
+            hem_depth: 0.03,
             least_area: 0.006,
             piece_share: 0.2,
-            hole_rim: 0.3,
+            hole_rim: 0.15,
             loose_distance: 0.03,
             edge_length: 0.007,
         }
