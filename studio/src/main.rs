@@ -1,3 +1,7 @@
 //! The `toile` program.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    ExitCode::from(toile_studio::run(std::env::args_os()) as u8)
+}

@@ -54,7 +54,10 @@ fn no_crate_imports_against_the_arrows() {
         match MAY_IMPORT.iter().find(|(n, _)| *n == name) {
             None => wrong.push(format!("{folder}: {name} is in no row of the table of imports")),
             Some((_, allowed)) => wrong.extend(
-                imports.iter().filter(|i| !allowed.contains(&i.as_str())).map(|i| format!("{name} must not import {i}")),
+                imports
+                    .iter()
+                    .filter(|i| !allowed.contains(&i.as_str()))
+                    .map(|i| format!("{name} must not import {i}")),
             ),
         }
     }

@@ -1,0 +1,72 @@
+//! The command line: what can be asked, and in which words.
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::commands;
+
+const AFTER: &str = "\
+The usual way, from recordings to a dressed avatar:
+  toile import takes/body     --subject anna --layer body
+  toile import takes/trousers --subject anna --layer trousers --type trousers
+  toile import takes/shirt    --subject anna --layer shirt --type top
+  toile process anna
+  then open anna/report.html in a browser and anna/avatar.glb in a 3D program
+
+No recordings at hand?  `toile demo` does all this on the session that ships with Toile.
+
+Exit codes: 0 done, 1 failed, 2 the command line is wrong, 3 done, but recorded data was lost.
+Without its own `--json`, a command prints for people; progress and warnings go to standard error.";
+
+/// Turns layer-by-layer scans of a person into an animated avatar that wears the person's real garments.
+#[derive(Debug, Parser)]
+#[command(name = "toile", version, after_help = AFTER, arg_required_else_help = true)]
+pub struct Cli {
+    /// What every command takes.
+    #[command(flatten)]
+    pub globals: Globals,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What every command takes.
+#[derive(Debug, Clone, Args)]
+pub struct Globals {
+    /// Processor threads to use (0: as many as the machine has). The result is the same for any number
+    #[arg(long, global = true, default_value_t = 0, value_name = "N")]
+    pub threads: usize,
+    /// Print one JSON document with the results (or the error) instead of text
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// No progress, no warnings on standard error
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more (-vv: everything)
+    #[arg(long, short, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Bring a recorded folder into a subject as its next take
+    Import(commands::import::Import),
+    /// Tell what is in a recording, a folder or a subject, and whether it is healthy
+    Inspect(commands::inspect::Inspect),
+    /// Fuse takes into scans
+    Fuse(commands::fuse::Fuse),
+    /// Fit the body to the scan of the undressed person
+    Fit(commands::fit::Fit),
+    /// Cut the garments out of the dressed scans and stack them
+    Extract(commands::extract::Extract),
+    /// Write the avatar: GLB with a motion, VRM; or a take in a plain encoding
+    Export(commands::export::Export),
+    /// Everything from recorded takes to avatar and report: runs whatever is missing
+    Process(commands::process::Process),
+    /// The whole way on the recorded session that ships with Toile
+    Demo(commands::demo::Demo),
+    /// Make a synthetic subject with its truth: for training, tests and trials of a rig
+    Synthesize(commands::synthesize::Synthesize),
+    /// Print completions for a shell
+    Completions(commands::completions::Completions),
+}

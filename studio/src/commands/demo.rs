@@ -1,0 +1,93 @@
+//! `toile demo`: the whole way on the recorded session that ships with Toile.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use crate::{StudioError, commands::process, disk, outcome::Answer, pipeline::Options, run::Session};
+
+const AFTER: &str = "\
+Copies the session of recorded/ to demo/ beside it, processes it, and says where to look.
+
+Examples:
+  toile demo
+  toile demo --out /tmp/demo --motion dance.bvh";
+
+/// The whole way on the recorded session that ships with Toile
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Demo {
+    /// Where to put the copy (default: demo/ beside the folder of recorded sessions)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Folder of recorded sessions (default: the recorded/ found above the current folder or the program)
+    #[arg(long, value_name = "DIR")]
+    recorded: Option<PathBuf>,
+    /// BVH motion for the avatar (without: a walk that ships with Toile)
+    #[arg(long, value_name = "FILE")]
+    motion: Option<PathBuf>,
+}
+
+impl Demo {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where no session is found or it cannot be copied; what processing says.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        let recorded = self.recorded.clone().or_else(find_recorded).ok_or_else(|| {
+            StudioError::Usage("no folder recorded/ above here or the program; give it with --recorded DIR".into())
+        })?;
+        let subjects = subjects_in(&recorded)?;
+        let out = self.out.clone().unwrap_or_else(|| recorded.parent().unwrap_or(Path::new(".")).join("demo"));
+        let mut copies = Vec::new();
+        for subject in &subjects {
+            let copy = out.join(subject.file_name().unwrap_or_default());
+            copy_subject(subject, &copy)?;
+            copies.push(copy);
+        }
+        let mut answer =
+            process::process(&copies, &Options { motion: self.motion.clone(), ..Options::default() }, session)?;
+        answer.text.push_str("open the report in a browser; drop the GLB into Blender, or any viewer of glTF\n");
+        Ok(answer)
+    }
+}
+
+/// The `recorded/` next to or above the current folder, else above the program.
+fn find_recorded() -> Option<PathBuf> {
+    let starts = [std::env::current_dir().ok(), std::env::current_exe().ok()];
+    let has_session = |folder: &PathBuf| subjects_in(folder).is_ok();
+    starts.into_iter().flatten().find_map(|start| start.ancestors().map(|a| a.join("recorded")).find(has_session))
+}
+
+/// The subjects in a folder, by name.
+fn subjects_in(recorded: &Path) -> Result<Vec<PathBuf>, StudioError> {
+    let entries = fs::read_dir(recorded).map_err(|e| StudioError::io(recorded, e))?;
+    let mut subjects: Vec<PathBuf> =
+        entries.flatten().map(|e| e.path()).filter(|p| p.join("subject.toml").is_file()).collect();
+    subjects.sort();
+    if subjects.is_empty() {
+        return Err(StudioError::format(recorded, "there is no subject in it (no */subject.toml)"));
+    }
+    Ok(subjects)
+}
+
+/// Copies what was recorded, not what was built; files that are the same already stay.
+fn copy_subject(from: &Path, to: &Path) -> Result<(), StudioError> {
+    for name in ["subject.toml", "takes", "edits"] {
+        copy(&from.join(name), &to.join(name))?;
+    }
+    Ok(())
+}
+
+fn copy(from: &Path, to: &Path) -> Result<(), StudioError> {
+    if from.is_dir() {
+        let entries = fs::read_dir(from).map_err(|e| StudioError::io(from, e))?;
+        return entries.flatten().try_for_each(|e| copy(&e.path(), &to.join(e.file_name())));
+    }
+    if !from.exists() {
+        return Ok(());
+    }
+    let bytes = fs::read(from).map_err(|e| StudioError::io(from, e))?;
+    if fs::read(to).is_ok_and(|old| old == bytes) { Ok(()) } else { disk::write_whole(to, &bytes) }
+}

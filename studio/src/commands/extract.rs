@@ -1,0 +1,40 @@
+//! `toile extract`: the garments out of the dressed scans.
+
+use std::path::PathBuf;
+
+use crate::{
+    StudioError,
+    commands::{must_exist, reach},
+    outcome::Answer,
+    pipeline::{Goal, Options},
+    run::Session,
+};
+
+const AFTER: &str = "\
+Runs what is missing before it: fusing, the body, the poses.
+
+Examples:
+  toile extract anna
+  toile extract anna trousers      only up to this layer";
+
+/// Cut the garments out of the dressed scans and stack them
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Extract {
+    /// The subject
+    subject: PathBuf,
+    /// Stop after this layer, such as `trousers` or `01-trousers`
+    layer: Option<String>,
+}
+
+impl Extract {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where a stage has no answer or files cannot be read or written.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        must_exist(&self.subject)?;
+        let options = Options { last_layer: self.layer.clone(), ..Options::default() };
+        reach(&self.subject, Goal::Garments, &options, session)
+    }
+}

@@ -1,0 +1,72 @@
+//! `toile fit`: the body of a subject, or of any scan.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+use toile_character::BodyModel;
+
+use crate::{
+    StudioError,
+    commands::{must_exist, reach},
+    outcome::Answer,
+    pipeline::{Goal, Options, Run, fit},
+    run::Session,
+};
+
+const AFTER: &str = "\
+Examples:
+  toile fit anna
+  toile fit --scan somebody.ply --out /tmp/somebody";
+
+/// Fit the body to the scan of the undressed person
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Fit {
+    /// The subject
+    #[arg(required_unless_present = "scan", conflicts_with = "scan")]
+    subject: Option<PathBuf>,
+    /// Instead of a subject: any mesh of a standing person (PLY or OBJ), metres, +Y up
+    #[arg(long, value_name = "MESH", requires = "out")]
+    scan: Option<PathBuf>,
+    /// Folder of the result, with --scan
+    #[arg(long, value_name = "DIR", requires = "scan")]
+    out: Option<PathBuf>,
+}
+
+impl Fit {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where there is no person in the scan, or files cannot be read or written.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        match (&self.subject, &self.scan, &self.out) {
+            (Some(subject), ..) => {
+                must_exist(subject)?;
+                reach(subject, Goal::Body, &Options::default(), session)
+            }
+            (None, Some(scan), Some(out)) => fit_scan(scan, out, session),
+            _ => Err(StudioError::Usage("give a subject, or --scan MESH with --out DIR".into())),
+        }
+    }
+}
+
+fn fit_scan(scan: &Path, out: &Path, session: &Session) -> Result<Answer, StudioError> {
+    must_exist(scan)?;
+    let name = scan.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let run = Run::single(scan.parent().unwrap_or(Path::new(".")), &name, &session.progress);
+    session.progress.plan(fit::COST);
+    let place = fit::Place {
+        scan: scan.to_path_buf(),
+        folder: out.to_path_buf(),
+        pose: out.join("pose.json"),
+        keep_frame: false,
+    };
+    let record = fit::fit(&run, &place, &BodyModel::load_default()?)?;
+    let files = ["body.ply", "model.ply", "rest.ply", "rigged_scan.glb", "body.json", "pose.json"].map(|f| out.join(f));
+    Ok(Answer {
+        text: files.iter().map(|f| format!("{}\n", f.display())).collect(),
+        results: json!({ "files": files, "fit": record.result }),
+        warnings: record.warnings,
+        ..Answer::default()
+    })
+}

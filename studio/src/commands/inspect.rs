@@ -1,0 +1,41 @@
+//! `toile inspect`: what is in a recording, a folder or a subject, and whether it is healthy.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+use toile_capture::inspect;
+
+use crate::{StudioError, commands::must_exist, outcome::Answer, run::Session};
+
+const AFTER: &str = "\
+Exits with 3 where recorded data was lost (a torn file, frames that cannot be read).
+
+Examples:
+  toile inspect anna
+  toile inspect anna/takes/00-body.mcap --json";
+
+/// Tell what is in a recording, a folder or a subject, and whether it is healthy
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Inspect {
+    /// A recording, a folder that import reads, or a subject
+    path: PathBuf,
+}
+
+impl Inspect {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where nothing at all can be read.
+    pub fn run(&self, _session: &Session) -> Result<Answer, StudioError> {
+        must_exist(&self.path)?;
+        let found = inspect(&self.path)?;
+        let (mut warnings, mut lost) = (Vec::new(), Vec::new());
+        for take in &found.takes {
+            let is_lost = take.loss.is_some() || !take.unreadable.is_empty();
+            let told = take.problems.iter().map(|p| format!("{}: {p}", take.name));
+            if is_lost { lost.extend(told) } else { warnings.extend(told) }
+        }
+        Ok(Answer { text: format!("{found}\n"), results: json!(found), warnings, lost, ..Answer::default() })
+    }
+}

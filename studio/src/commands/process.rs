@@ -1,0 +1,176 @@
+//! `toile process`: everything from recorded takes to avatar and report.
+
+use std::{
+    any::Any,
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use serde_json::{Value, json};
+
+use crate::{
+    StudioError,
+    outcome::Answer,
+    pipeline::{self, Goal, Options, Summary},
+    run::Session,
+};
+
+const AFTER: &str = "\
+What is up to date is not done again; a run that was interrupted goes on where it was.
+A subject that fails does not stop the others.
+
+Examples:
+  toile process anna
+  toile process archive/* --motion dance.bvh
+  toile process anna --json | jq .results";
+
+/// Everything from recorded takes to avatar and report: runs whatever is missing
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Process {
+    /// Subject folders
+    #[arg(required = true, value_name = "SUBJECT")]
+    subjects: Vec<PathBuf>,
+    /// BVH motion for the avatar (without: a walk that ships with Toile)
+    #[arg(long, value_name = "FILE")]
+    motion: Option<PathBuf>,
+}
+
+impl Process {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where the motion cannot be read; a subject that fails is told in the answer.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        process(&self.subjects, &Options { motion: self.motion.clone(), ..Options::default() }, session)
+    }
+}
+
+/// Processes subjects one after the other, past failed ones, and tells of all in a table.
+///
+/// # Errors
+/// [`StudioError`] where the options are wrong for every subject.
+pub fn process(subjects: &[PathBuf], options: &Options, session: &Session) -> Result<Answer, StudioError> {
+    options.check()?;
+    let mut answer = Answer::default();
+    let (mut rows, mut results) = (Vec::new(), Vec::new());
+    for subject in subjects {
+        let started = Instant::now();
+        let done = guarded(subject, || pipeline::process(subject, Goal::Report, options, &session.progress));
+        let seconds = started.elapsed().as_secs_f64();
+        let name = subject.display().to_string();
+        match done {
+            Ok(summary) => {
+                rows.push(row(&name, &summary, seconds));
+                results.push(result(&name, &summary, seconds));
+                collect(&mut answer, subjects.len(), &name, summary);
+            }
+            Err(error) => {
+                rows.push([name.clone(), "failed".into(), "-".into(), "-".into(), format!("{seconds:.1}")]);
+                let told = json!({ "kind": error.kind(), "message": error.to_string() });
+                results.push(json!({ "subject": name, "outcome": "failed", "error": told, "seconds": seconds }));
+                answer.failures.push(prefixed(subjects.len(), &name, &error.to_string()));
+            }
+        }
+    }
+    answer.text = table(&["subject", "result", "layers", "warnings", "seconds"], &rows);
+    if let [only] = subjects
+        && answer.failures.is_empty()
+    {
+        let at = |file: &str| only.join(file).display().to_string();
+        answer.text.push_str(&format!("\nlook at {} and {}\n", at("report.html"), at("avatar.glb")));
+    }
+    answer.results = Value::Array(results);
+    Ok(answer)
+}
+
+/// Runs `work`; a panic, which would be our own mistake, fails this subject alone.
+fn guarded<T>(subject: &Path, work: impl FnOnce() -> Result<T, StudioError>) -> Result<T, StudioError> {
+    let said = |panic: Box<dyn Any + Send>| {
+        let text = panic.downcast_ref::<String>().map(String::as_str);
+        text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("unknown").to_string()
+    };
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let reason = format!("a mistake inside Toile ({}); please report it", said(panic));
+        Err(StudioError::stage(subject, reason))
+    })
+}
+
+fn collect(answer: &mut Answer, subjects: usize, name: &str, summary: Summary) {
+    let all = |sentences: Vec<String>| sentences.into_iter().map(|s| prefixed(subjects, name, &s)).collect::<Vec<_>>();
+    answer.warnings.extend(all(summary.warnings));
+    answer.lost.extend(all(summary.lost));
+    answer.failures.extend(all(summary.failures));
+}
+
+fn prefixed(subjects: usize, name: &str, sentence: &str) -> String {
+    if subjects > 1 { format!("{name}: {sentence}") } else { sentence.to_string() }
+}
+
+fn outcome(summary: &Summary) -> &'static str {
+    match (summary.failures.is_empty(), summary.lost.is_empty()) {
+        (false, _) => "failed",
+        (true, false) => "lost",
+        (true, true) => "done",
+    }
+}
+
+fn row(name: &str, summary: &Summary, seconds: f64) -> [String; 5] {
+    let result = match outcome(summary) {
+        "failed" => "failed in part",
+        "lost" => "done, data lost",
+        done => done,
+    };
+    let count = |n: usize| n.to_string();
+    [name.into(), result.into(), count(summary.layers.len()), count(summary.warnings.len()), format!("{seconds:.1}")]
+}
+
+fn result(name: &str, summary: &Summary, seconds: f64) -> Value {
+    json!({
+        "subject": name,
+        "outcome": outcome(summary),
+        "layers": summary.layers,
+        "measurements": summary.measurements,
+        "files": summary.files,
+        "warnings": summary.warnings,
+        "lost": summary.lost,
+        "failures": summary.failures,
+        "seconds": seconds,
+    })
+}
+
+/// Columns as wide as they need to be; the first two left, the others right.
+pub fn table<const N: usize>(head: &[&str; N], rows: &[[String; N]]) -> String {
+    let lines: Vec<[String; N]> = std::iter::once(head.map(String::from)).chain(rows.iter().cloned()).collect();
+    let width = |k: usize| lines.iter().map(|l| l[k].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..N).map(width).collect();
+    let mut text = String::new();
+    for line in &lines {
+        let cells = line.iter().enumerate().map(|(k, cell)| match k {
+            0 | 1 => format!("{cell:<w$}", w = widths[k]),
+            _ => format!("{cell:>w$}", w = widths[k]),
+        });
+        text.push_str(cells.collect::<Vec<_>>().join("  ").trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_fails_one_subject() {
+        let error = guarded::<()>(Path::new("anna"), || panic!("index {}", 7)).unwrap_err();
+        assert!(error.to_string().starts_with("anna: ") && error.to_string().contains("index 7"));
+    }
+
+    #[test]
+    fn columns_line_up() {
+        let rows = [["a".to_string(), "done".into(), "12".into()], ["longer".into(), "x".into(), "3".into()]];
+        let text = table(&["who", "what", "n"], &rows);
+        assert_eq!(text, "who     what   n\na       done  12\nlonger  x      3\n");
+    }
+}

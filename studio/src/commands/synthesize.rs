@@ -1,0 +1,150 @@
+//! `toile synthesize`: a synthetic subject with its truth.
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use serde_json::json;
+use toile_synthetic::{
+    GarmentKind, GarmentSettings, SensorPreset, Sex, Subject, SyntheticError, SyntheticSettings,
+    folder::write_subject_folder, record::record_subject,
+};
+
+use crate::{StudioError, outcome::Answer, run::Session};
+
+const AFTER: &str = "\
+A virtual person on a turning disk, seen by a virtual depth camera; everything follows from the seed.
+As a subject it has takes that `toile process` reads; as folders it has the images and the truth beside.
+
+Examples:
+  toile synthesize --out olga --seed 7 --garments trousers,tshirt,jacket
+  toile synthesize --out olga-folders --as folders --sensor kinect1 --sway 0.8";
+
+/// Make a synthetic subject with its truth: for training, tests and trials of a rig
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Synthesize {
+    /// Folder of the subject; its name is the subject's
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// subject: recordings for `toile process`; folders: images for `toile import`, with the truth
+    #[arg(long = "as", value_enum, default_value_t = Kind::Subject)]
+    kind: Kind,
+    /// Everything random follows from it
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// What the takes add, inside to outside (at most five; `--garments ""` for the body alone)
+    #[arg(long, value_delimiter = ',', default_value = "trousers,tshirt", value_name = "KINDS")]
+    garments: Vec<String>,
+    /// Around which mean the person is drawn
+    #[arg(long, value_enum, default_value_t = SexChoice::Female)]
+    sex: SexChoice,
+    /// The camera to imitate: kinect1, kinect2, stereo
+    #[arg(long, default_value = SyntheticSettings::default().sensor.name())]
+    sensor: String,
+    /// Frames of each take
+    #[arg(long, default_value_t = SyntheticSettings::default().frames)]
+    frames: usize,
+    /// Degrees that the disk turns from the first to the last frame
+    #[arg(long, default_value_t = SyntheticSettings::default().degrees, allow_negative_numbers = true)]
+    degrees: f64,
+    /// Frames a second
+    #[arg(long, default_value_t = SyntheticSettings::default().fps)]
+    fps: f64,
+    /// How far the torso sways, degrees
+    #[arg(long, default_value_t = 0.0)]
+    sway: f64,
+    /// How far the chest moves with the breath, millimetres
+    #[arg(long, default_value_t = 0.0)]
+    breathing: f64,
+    /// Camera to axis, metres (default: what suits the camera)
+    #[arg(long)]
+    distance: Option<f64>,
+    /// Depth as the geometry is, without the sensor's noise
+    #[arg(long)]
+    clean: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum Kind {
+    Subject,
+    Folders,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SexChoice {
+    Female,
+    Male,
+}
+
+impl Synthesize {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where a setting is out of its range or a file cannot be written.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        let settings = self.settings()?;
+        if self.out.exists() {
+            return Err(StudioError::Usage(format!("{} exists already; choose another --out", self.out.display())));
+        }
+        let wrong = |e| failed(&self.out, e);
+        let progress = &session.progress;
+        progress.plan(1.0);
+        progress.begin(&format!("{}: synthesize", settings.name), 1.0);
+        match self.kind {
+            Kind::Folders => write_subject_folder(&settings, &self.out, &|x| progress.at(x)).map_err(wrong)?,
+            Kind::Subject => {
+                let subject = Subject::new(&settings).map_err(wrong)?;
+                record_subject(&subject, &self.out, &|x| progress.at(x)).map_err(wrong)?;
+            }
+        }
+        progress.end();
+        let text = match self.kind {
+            Kind::Subject => format!("{0}: now `toile process {0}`\n", self.out.display()),
+            Kind::Folders => format!("{}: folders to import, with truth/ in each\n", self.out.display()),
+        };
+        Ok(Answer { text, results: json!({ "out": self.out, "settings": settings }), ..Answer::default() })
+    }
+
+    fn settings(&self) -> Result<SyntheticSettings, StudioError> {
+        let kinds = GarmentKind::ALL.map(GarmentKind::name).join(", ");
+        let garment = |name: &String| {
+            let kind = GarmentKind::from_name(name);
+            let unknown = || StudioError::Usage(format!("--garments: there is no `{name}`; choose of {kinds}"));
+            kind.map(GarmentSettings::of).ok_or_else(unknown)
+        };
+        let garments = self.garments.iter().filter(|n| !n.is_empty()).map(garment).collect::<Result<_, _>>()?;
+        let sensors = SensorPreset::ALL.map(SensorPreset::name).join(", ");
+        let sensor = SensorPreset::from_name(&self.sensor).ok_or_else(|| {
+            StudioError::Usage(format!("--sensor: there is no `{}`; choose of {sensors}", self.sensor))
+        })?;
+        let name = self.out.file_name().map_or("subject".into(), |n| n.to_string_lossy().into_owned());
+        let sex = match self.sex {
+            SexChoice::Female => Sex::Female,
+            SexChoice::Male => Sex::Male,
+        };
+        let settings = SyntheticSettings {
+            name,
+            seed: self.seed,
+            sex,
+            garments,
+            sensor,
+            frames: self.frames,
+            degrees: self.degrees,
+            fps: self.fps,
+            sway_degrees: self.sway,
+            breathing_m: 1e-3 * self.breathing,
+            distance_m: self.distance,
+            noise: !self.clean,
+            ..SyntheticSettings::default()
+        };
+        settings.validate().map_err(|e| StudioError::Usage(e.to_string()))?;
+        Ok(settings)
+    }
+}
+
+fn failed(out: &Path, error: SyntheticError) -> StudioError {
+    match error {
+        SyntheticError::Capture(error) => error.into(),
+        other => StudioError::stage(out, other),
+    }
+}

@@ -1,0 +1,85 @@
+//! The fitted body between runs: `body.json`, `rest.ply` and the pose files, back as a skinned mesh.
+
+use std::path::Path;
+
+use serde::{Deserialize, de::DeserializeOwned};
+use toile_character::{BodyModel, Pose, SkinnedMesh, joint::JOINT_COUNT};
+use toile_geometry::ply;
+
+use crate::{StudioError, pipeline::folders::Folders, stage};
+
+/// What later stages need of `body.json`.
+#[derive(Debug, Clone, Deserialize)]
+struct Shape {
+    /// Shape coefficients, in standard deviations.
+    beta: Vec<f64>,
+}
+
+/// The fitted body.
+pub struct Body {
+    /// The conformed body at rest with its weights.
+    pub skinned: SkinnedMesh,
+    /// Its pose in scan 0.
+    pub pose0: Pose,
+    /// Shape coefficients, in standard deviations.
+    pub beta: Vec<f64>,
+}
+
+impl Body {
+    /// Reads what the stage `fit` wrote; `layer` is the body take's folder name.
+    ///
+    /// # Errors
+    /// [`StudioError`] where a file is missing or not what it should be.
+    pub fn load(folders: &Folders, layer: &str, model: &BodyModel) -> Result<Self, StudioError> {
+        let Shape { beta } = read_json(&folders.body_json())?;
+        let mut mesh = ply::read(&folders.body_rest())?;
+        mesh.recompute_normals();
+        let skinned = SkinnedMesh::new(mesh, model.skeleton_at(&beta), model.weights.clone())?;
+        Ok(Self { skinned, pose0: read_pose(&folders.pose(layer))?, beta })
+    }
+}
+
+/// Reads a pose file.
+///
+/// # Errors
+/// [`StudioError`] where it is missing or not what it should be.
+pub fn read_pose(path: &Path) -> Result<Pose, StudioError> {
+    let pose: Pose = read_json(path)?;
+    if pose.rotations.len() == JOINT_COUNT {
+        return Ok(pose);
+    }
+    let count = pose.rotations.len();
+    Err(StudioError::format(path, format!("has {count} rotations instead of {JOINT_COUNT}; delete it and run again")))
+}
+
+/// The bytes of a pose file.
+///
+/// # Errors
+/// [`StudioError::Format`] where the pose holds no numbers.
+pub fn pose_bytes(pose: &Pose) -> Result<Vec<u8>, StudioError> {
+    stage::pretty(pose)
+}
+
+/// Reads a JSON file of the build folder.
+///
+/// # Errors
+/// [`StudioError`] where it is missing or not what it should be.
+pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, StudioError> {
+    let bytes = std::fs::read(path).map_err(|e| StudioError::io(path, e))?;
+    serde_json::from_slice(&bytes).map_err(|e| StudioError::format(path, format!("{e}; delete it and run again")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_is_read_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("pose.json");
+        std::fs::write(&path, pose_bytes(&Pose::identity()).unwrap()).unwrap();
+        assert_eq!(read_pose(&path).unwrap(), Pose::identity());
+        std::fs::write(&path, "{\"translation\": [0, 0, 0], \"rotations\": []}").unwrap();
+        assert!(read_pose(&path).unwrap_err().to_string().contains("0 rotations"));
+    }
+}

@@ -1,0 +1,96 @@
+//! Stage `cut`: the new garment out of a dressed take's scan.
+//!
+//! Reads the scan, the scan of the take before, both poses and the body. Writes `cut.ply`, the garment in the take's
+//! own pose and frame, and `unstacked.ply`, the same in the common frame with its skin weights as vertex attributes.
+
+use serde_json::json;
+use toile_fitting::rigged_scan;
+use toile_garments::{ExtractSettings, Extraction, Take, Warning, extract};
+use toile_geometry::ply;
+
+use crate::{
+    StudioError,
+    pipeline::{
+        Run,
+        body_file::{Body, read_pose},
+        skin_attributes::with_weights,
+    },
+    stage::{Product, Record, Stage},
+};
+
+/// Raised whenever the same inputs and settings give another garment.
+const VERSION: u32 = 1;
+/// Expected seconds.
+pub const COST: f64 = 3.0;
+
+/// Cuts the garment of take `n` (1 or more), unless that is up to date.
+///
+/// # Errors
+/// [`StudioError`] where the take shows no new garment, or files cannot be read or written.
+pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
+    let told = run.garment_type(n);
+    let folders = &run.folders;
+    let (layer, before) = (run.layers[n].as_str(), run.layers[n - 1].as_str());
+    let settings = ExtractSettings::default();
+    let paths = [layer, before].map(|l| (folders.scan(l), folders.pose(l)));
+    let stage = Stage {
+        name: "cut",
+        version: VERSION,
+        cost: COST,
+        root: &folders.root,
+        folder: folders.layer(layer),
+        inputs: vec![
+            paths[0].0.clone(),
+            paths[0].1.clone(),
+            paths[1].0.clone(),
+            paths[1].1.clone(),
+            folders.body_rest(),
+            folders.body_json(),
+            folders.pose(run.first_layer()),
+        ],
+        settings: json!({ "extract": settings, "type": told }),
+        outputs: vec![folders.cut(layer), folders.unstacked(layer)],
+    };
+    stage.run(&run.label(layer, "cut"), run.progress, |progress| {
+        let [(scan, pose), (scan_before, pose_before)] = &paths;
+        let (scan, scan_before) = (run.read_mesh(scan)?, run.read_mesh(scan_before)?);
+        let (pose, pose_before) = (read_pose(pose)?, read_pose(pose_before)?);
+        let take = Take {
+            scan: &scan,
+            previous: &rigged_scan(&scan_before, &body.skinned, &pose_before).posed_mesh(&pose),
+            body: &body.skinned.posed_mesh(&pose),
+            weights: &body.skinned.weights,
+            skeleton: &body.skinned.skeleton,
+            pose: &pose,
+            pose0: &body.pose0,
+            garment_type: told,
+        };
+        let found = extract(&take, &settings, progress).map_err(|e| StudioError::stage(&paths[0].0, e))?;
+        product(run, layer, &found)
+    })
+}
+
+fn product(run: &Run, layer: &str, found: &Extraction) -> Result<Product, StudioError> {
+    if found.warnings.contains(&Warning::NothingNew) {
+        return Err(StudioError::NothingNew { path: run.take(layer), reason: Warning::NothingNew.to_string() });
+    }
+    let mut warnings: Vec<String> = found.warnings.iter().map(|w| format!("{layer}: {w}")).collect();
+    if found.report.unsure_share > UNSURE_SHARE {
+        let percent = 100.0 * found.report.unsure_share;
+        warnings.push(format!(
+            "{layer}: {percent:.0} % of the garment could as well be what was worn before; look at its hem"
+        ));
+    }
+    Ok(Product {
+        files: vec![
+            (run.folders.cut(layer), ply::encode(&found.in_take)),
+            (run.folders.unstacked(layer), ply::encode(&with_weights(&found.garment, &found.weights))),
+        ],
+        result: json!(found.report),
+        warnings,
+        ..Product::default()
+    })
+}
+
+/// More unsure vertices than this are worth a warning.
+const UNSURE_SHARE: f32 = 0.15;

@@ -1,0 +1,114 @@
+//! Stage `fit`: the undressed scan → the body: shape, pose, own surface, weights, measures.
+//!
+//! Reads `00-body/scan.ply`. Writes `00-body/pose.json` and in `body/`: `body.ply`, `model.ply`, `rest.ply`,
+//! `rigged_scan.glb`, `body.json`.
+
+use std::path::PathBuf;
+
+use nalgebra::Translation3;
+use serde_json::json;
+use toile_character::BodyModel;
+use toile_fitting::{BodyFit, FitReport, FitSettings, Mend, Verdict, fit_body, rig_scan};
+use toile_geometry::{Mesh, Rigid, ply};
+
+use crate::{
+    StudioError,
+    pipeline::{Run, body_file::pose_bytes, deliverables},
+    stage::{self, Product, Record, Stage},
+};
+
+/// Raised whenever the same scan and settings give another body.
+const VERSION: u32 = 1;
+/// Expected seconds.
+pub const COST: f64 = 5.0;
+
+/// Where the files of a fit go.
+pub struct Place {
+    /// The scan.
+    pub scan: PathBuf,
+    /// Folder of the body's files.
+    pub folder: PathBuf,
+    /// Pose of the body in the scan.
+    pub pose: PathBuf,
+    /// The files stay in the scan's own frame, as later stages need it; else they stand upright, in metres.
+    pub keep_frame: bool,
+}
+
+/// Fits the body of a subject, unless that is up to date.
+///
+/// # Errors
+/// [`StudioError`] where the scan cannot be a person, or files cannot be read or written.
+pub fn run(run: &Run, model: &BodyModel) -> Result<Record, StudioError> {
+    let layer = run.first_layer();
+    let folders = &run.folders;
+    let place =
+        Place { scan: folders.scan(layer), folder: folders.body(), pose: folders.pose(layer), keep_frame: true };
+    fit(run, &place, model)
+}
+
+/// Fits a body to any scan.
+///
+/// # Errors
+/// As [`run`].
+pub fn fit(run: &Run, place: &Place, model: &BodyModel) -> Result<Record, StudioError> {
+    let settings = FitSettings::default();
+    let at = |name: &str| place.folder.join(name);
+    let names = ["body.ply", "model.ply", "rest.ply", "rigged_scan.glb", "body.json"];
+    let stage = Stage {
+        name: "fit",
+        version: VERSION,
+        cost: COST,
+        root: &run.folders.root,
+        folder: place.folder.clone(),
+        inputs: vec![place.scan.clone()],
+        settings: json!(settings),
+        outputs: names.iter().map(|n| at(n)).chain([place.pose.clone()]).collect(),
+    };
+    stage.run(&run.label("body", "fit"), run.progress, |progress| {
+        let scan = run.read_mesh(&place.scan)?;
+        let mut fit = fit_body(model, &scan, &settings, progress).map_err(|e| StudioError::stage(&place.scan, e))?;
+        if place.keep_frame {
+            back_to_the_scan(&mut fit, place)?;
+        }
+        product(place, &scan, &fit)
+    })
+}
+
+/// Undoes the turn with which a scan that did not stand upright was fitted.
+fn back_to_the_scan(fit: &mut BodyFit, place: &Place) -> Result<(), StudioError> {
+    if (fit.mend.scale - 1.0).abs() > 1e-9 {
+        let reason = "the person in it is not of human size: is depth_scale of the recording right?";
+        return Err(StudioError::stage(&place.scan, reason));
+    }
+    let scan_from_upright = Rigid::from_parts(Translation3::identity(), fit.mend.rotation.inverse());
+    fit.pose = fit.pose.moved(&scan_from_upright, &fit.skeleton);
+    fit.model_mesh = fit.model_mesh.transformed(&scan_from_upright);
+    fit.mend = Mend::default();
+    Ok(())
+}
+
+fn product(place: &Place, scan: &Mesh, fit: &BodyFit) -> Result<Product, StudioError> {
+    let at = |name: &str| place.folder.join(name);
+    let report = &fit.report;
+    if fit.verdict() == Verdict::Failed {
+        let reason = format!("no person could be fitted: {}", report.reasons.join("; "));
+        return Err(StudioError::stage(&place.scan, reason));
+    }
+    let scan = fit.mend.apply(scan);
+    let weights = rig_scan(&scan, &fit.body, &fit.pose);
+    let rigged = deliverables::rigged_scan(&scan, &weights, &fit.skeleton, &fit.pose)?;
+    let files = vec![
+        (at("body.ply"), ply::encode(&fit.posed_body())),
+        (at("model.ply"), ply::encode(&fit.model_mesh)),
+        (at("rest.ply"), ply::encode(&fit.body.mesh)),
+        (at("rigged_scan.glb"), rigged),
+        (at("body.json"), stage::pretty(&fit.summary())?),
+        (place.pose.clone(), pose_bytes(&fit.pose)?),
+    ];
+    Ok(Product { files, result: json!(report), warnings: warnings(report), ..Product::default() })
+}
+
+fn warnings(report: &FitReport) -> Vec<String> {
+    let doubts = report.reasons.iter().map(|r| format!("body: {r}"));
+    doubts.chain(report.notices.iter().map(|n| format!("body: {n}"))).collect()
+}

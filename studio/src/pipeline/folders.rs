@@ -1,0 +1,102 @@
+//! Where a subject's files lie.
+
+use std::path::{Path, PathBuf};
+
+/// A subject's folder and what is in it.
+#[derive(Debug, Clone)]
+pub struct Folders {
+    /// The subject's folder.
+    pub root: PathBuf,
+}
+
+impl Folders {
+    /// Of the subject at `root`.
+    pub fn new(root: &Path) -> Self {
+        Self { root: root.to_path_buf() }
+    }
+
+    /// Everything that can be built again.
+    pub fn build(&self) -> PathBuf {
+        self.root.join("build")
+    }
+
+    /// What was built from one take, such as `01-trousers`.
+    pub fn layer(&self, layer: &str) -> PathBuf {
+        self.build().join(layer)
+    }
+
+    /// The fused scan of a take.
+    pub fn scan(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("scan.ply")
+    }
+
+    /// Pose of the body in a take's scan.
+    pub fn pose(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("pose.json")
+    }
+
+    /// The body posed inside a take's scan.
+    pub fn posed_body(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("body.ply")
+    }
+
+    /// The garment as it was cut, in the take's own pose and frame.
+    pub fn cut(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("cut.ply")
+    }
+
+    /// The garment in the common frame before stacking, with its skin weights as vertex attributes.
+    pub fn unstacked(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("unstacked.ply")
+    }
+
+    /// The garment in the common frame, over all layers below.
+    pub fn garment(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("garment.ply")
+    }
+
+    /// The fitted body.
+    pub fn body(&self) -> PathBuf {
+        self.build().join("body")
+    }
+
+    /// The conformed body in scan 0's pose and frame.
+    pub fn body_mesh(&self) -> PathBuf {
+        self.body().join("body.ply")
+    }
+
+    /// The conformed body at rest.
+    pub fn body_rest(&self) -> PathBuf {
+        self.body().join("rest.ply")
+    }
+
+    /// Measurements, joints, shape and pose of the body.
+    pub fn body_json(&self) -> PathBuf {
+        self.body().join("body.json")
+    }
+
+    /// Where the stages over all layers keep their records.
+    pub fn layers(&self) -> PathBuf {
+        self.build().join("layers")
+    }
+
+    /// Where writing the deliverables keeps its record.
+    pub fn avatar(&self) -> PathBuf {
+        self.build().join("avatar")
+    }
+
+    /// The avatar with its motion.
+    pub fn glb(&self) -> PathBuf {
+        self.root.join("avatar.glb")
+    }
+
+    /// The avatar in a T-pose.
+    pub fn vrm(&self) -> PathBuf {
+        self.root.join("avatar.vrm")
+    }
+
+    /// The page for the operator.
+    pub fn report(&self) -> PathBuf {
+        self.root.join("report.html")
+    }
+}

@@ -1,0 +1,171 @@
+//! Stage `report`: the page for the operator.
+//!
+//! Reads everything that was built; writes `report.html` in the subject's folder.
+
+use std::{collections::BTreeMap, path::Path};
+
+use serde_json::{Value, json};
+use toile_character::{Motion, SkinWeights, skinning};
+use toile_geometry::Mesh;
+
+use crate::{
+    StudioError,
+    pipeline::{
+        Run, Summary,
+        body_file::{Body, read_json},
+        motion,
+        skin_attributes::take_weights,
+    },
+    report::{self, Contents, TakeRow},
+    stage::{Product, Stage},
+};
+
+/// Raised whenever the page looks different.
+const VERSION: u32 = 1;
+/// Expected seconds.
+pub const COST: f64 = 4.0;
+/// Times of the motion that are shown.
+const FRAMES: usize = 4;
+
+/// Writes the page, unless that is up to date.
+///
+/// # Errors
+/// [`StudioError`] where a file cannot be read or written or a picture cannot be drawn.
+pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Result<(), StudioError> {
+    let folders = &run.folders;
+    let garments: Vec<&str> = run.garments().collect();
+    let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.glb()];
+    inputs.extend(run.layers.iter().map(|l| folders.scan(l)));
+    inputs.extend(garments.iter().flat_map(|l| [folders.garment(l), folders.unstacked(l)]));
+    let said = json!([summary.warnings, summary.lost, summary.failures, run.layers, run.title()]);
+    let stage = Stage {
+        name: "report",
+        version: VERSION,
+        cost: COST,
+        root: &folders.root,
+        folder: folders.build().join("report"),
+        inputs,
+        settings: said,
+        outputs: vec![folders.report()],
+    };
+    stage.run(&run.label("report", "draw"), run.progress, |progress| {
+        let contents = contents(run, body, bvh, summary)?;
+        let html = report::write(&contents, &folders.report(), progress)?;
+        Ok(Product { files: vec![(folders.report(), html.into_bytes())], ..Product::default() })
+    })?;
+    Ok(())
+}
+
+/// Stature, girths and volume from `body.json`; `None` where there is no body yet.
+pub fn measurements(run: &Run) -> Option<Value> {
+    let body: Value = read_json(&run.folders.body_json()).ok()?;
+    Some(json!({ "stature_m": body["stature_m"], "girths_m": body["girths_m"], "volume_m3": body["volume_m3"] }))
+}
+
+fn contents(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Result<Contents, StudioError> {
+    let folders = &run.folders;
+    let read_all = |layers: &[&str], path: &dyn Fn(&str) -> std::path::PathBuf| {
+        layers.iter().map(|l| Ok((l.to_string(), run.read_mesh(&path(l))?))).collect::<Result<Vec<_>, StudioError>>()
+    };
+    let takes: Vec<&str> = run.layers.iter().map(String::as_str).collect();
+    let worn: Vec<&str> = run.garments().collect();
+    let garments = read_all(&worn, &|l| folders.garment(l))?;
+    let body_mesh = run.read_mesh(&folders.body_mesh())?;
+    let moved = motion::load(bvh, &body.skinned.skeleton)?.motion;
+    Ok(Contents {
+        name: run.title().to_string(),
+        subtitle: run.subtitle(),
+        takes: takes.iter().map(|l| take_row(l, summary)).collect(),
+        measurements: measurement_rows(run),
+        warnings: summary.warnings.clone(),
+        lost: summary.lost.clone(),
+        failures: summary.failures.clone(),
+        scans: read_all(&takes, &|l| folders.scan(l))?,
+        motion: motion_frames(run, body, &body_mesh, &garments, &moved)?,
+        body: body_mesh,
+        garments,
+        seconds: seconds(run),
+    })
+}
+
+/// What each take's records say, in figures.
+fn take_row(layer: &str, summary: &Summary) -> TakeRow {
+    let found = |stage: &str| {
+        let key = format!("{layer}/{stage}");
+        summary.stages.iter().find(|s| s.0 == key).map_or(Value::Null, |s| s.1.result.clone())
+    };
+    let (fuse, cut) = (found("fuse"), found("cut"));
+    let number = |value: &Value, digits: usize| value.as_f64().map_or("–".into(), |x| format!("{x:.digits$}"));
+    let dropped = fuse["dropped"].as_array().map_or("–".into(), |d| d.len().to_string());
+    let kind = cut["garment_type"].as_str().unwrap_or("–").to_string();
+    let guessed = if cut["type_guessed"] == true { " (guessed)" } else { "" };
+    TakeRow {
+        layer: layer.to_string(),
+        cells: vec![
+            ("frames fused", number(&fuse["frames_fused"], 0)),
+            ("left out", dropped),
+            ("turned, °", number(&fuse["turned_deg"], 0)),
+            ("residual, mm", number(&fuse["residual_mm"], 2)),
+            ("seam, mm", number(&fuse["seam_after_mm"], 2)),
+            ("unseen, %", number(&fuse["filled_percent"], 1)),
+            ("garment", format!("{kind}{guessed}")),
+            ("area, m²", number(&cut["area_m2"], 2)),
+        ],
+    }
+}
+
+fn measurement_rows(run: &Run) -> Vec<(String, String)> {
+    let values = measurements(run).unwrap_or_default();
+    let length = |value: &Value| value.as_f64().map_or("–".to_string(), |m| format!("{:.1} cm", 100.0 * m));
+    let mut rows = vec![("stature".to_string(), length(&values["stature_m"]))];
+    let girths = values["girths_m"].as_object().into_iter().flatten();
+    rows.extend(girths.map(|(name, value)| (format!("{name} girth"), length(value))));
+    let litres = values["volume_m3"].as_f64().map_or("–".to_string(), |v| format!("{:.1} l", 1e3 * v));
+    rows.push(("volume".into(), litres));
+    rows
+}
+
+/// All layers at a few times of the motion.
+fn motion_frames(
+    run: &Run,
+    body: &Body,
+    body_mesh: &Mesh,
+    garments: &[(String, Mesh)],
+    motion: &Motion,
+) -> Result<Vec<(String, Vec<Mesh>)>, StudioError> {
+    let skeleton = &body.skinned.skeleton;
+    let mut layers: Vec<(&Mesh, SkinWeights)> = vec![(body_mesh, body.skinned.weights.clone())];
+    for (layer, mesh) in garments {
+        let path = run.folders.unstacked(layer);
+        let weights = take_weights(&mut run.read_mesh(&path)?);
+        layers.push((mesh, weights.ok_or_else(|| StudioError::format(&path, "has no skin weights; delete it"))?));
+    }
+    let rest_from_pose0 = body.pose0.skinning_transforms(skeleton);
+    let rest: Vec<_> = layers.iter().map(|(mesh, w)| skinning::unskin(&mesh.positions, w, &rest_from_pose0)).collect();
+    let count = motion.poses.len();
+    let shown = (0..FRAMES.min(count)).map(|k| k * count / FRAMES.min(count).max(1));
+    let frame = |k: usize| {
+        let transforms = motion.poses[k].skinning_transforms(skeleton);
+        let posed = layers.iter().zip(&rest).map(|((mesh, weights), rest)| {
+            let positions = skinning::skin(rest, weights, &transforms);
+            let mut posed = Mesh { positions, normals: Vec::new(), ..(*mesh).clone() };
+            posed.recompute_normals();
+            posed
+        });
+        (format!("{} at {:.1} s", motion.name, k as f64 * motion.frame_time), posed.collect())
+    };
+    Ok(shown.map(frame).collect())
+}
+
+/// Seconds by folder and stage, as the timings files say.
+fn seconds(run: &Run) -> BTreeMap<String, f64> {
+    let folders = &run.folders;
+    let places = run.layers.iter().map(|l| (l.clone(), folders.layer(l)));
+    let others = [("body", folders.body()), ("layers", folders.layers()), ("avatar", folders.avatar())];
+    let mut all = BTreeMap::new();
+    for (name, folder) in places.chain(others.map(|(n, f)| (n.to_string(), f))) {
+        let timings: BTreeMap<String, Value> = read_json(&folder.join("timings.json")).unwrap_or_default();
+        all.extend(timings.iter().filter_map(|(stage, t)| Some((format!("{name}: {stage}"), t["seconds"].as_f64()?))));
+    }
+    all
+}

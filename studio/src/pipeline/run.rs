@@ -1,0 +1,161 @@
+//! One run over one subject.
+
+use std::{
+    fs::{self, File, TryLockError},
+    path::{Path, PathBuf},
+};
+
+use toile_capture::Subject;
+use toile_garments::GarmentType;
+use toile_geometry::{Mesh, ply};
+
+use crate::{
+    Progress, StudioError,
+    pipeline::{Goal, cut, deliverables, fit, folders::Folders, fuse, page, pose, stack},
+};
+
+/// One run: where things are, what the layers are, where progress is shown.
+pub struct Run<'a> {
+    /// Where the files lie.
+    pub folders: Folders,
+    /// Folder names of the takes in their order, such as `00-body`.
+    pub layers: Vec<String>,
+    /// Where progress is shown.
+    pub progress: &'a Progress,
+    /// The subject, or `None` for a single recording or scan.
+    pub subject: Option<Subject>,
+    name: String,
+    left_out: Vec<String>,
+    /// Held open: no other run works on the subject meanwhile.
+    _lock: Option<File>,
+}
+
+impl<'a> Run<'a> {
+    /// Over the subject at `root`, up to the layer called `last` (or with that folder name).
+    ///
+    /// # Errors
+    /// [`StudioError`] where there is no subject, it has no such layer, or another run works on it.
+    pub fn open(root: &Path, last: Option<&str>, progress: &'a Progress) -> Result<Self, StudioError> {
+        let subject = Subject::open(root)?;
+        let mut layers: Vec<String> = subject.layers().iter().map(|l| l.label()).collect();
+        if layers.is_empty() {
+            let reason =
+                "the subject has no take yet; bring one in with `toile import FOLDER --subject DIR --layer body`";
+            return Err(StudioError::stage(root, reason));
+        }
+        if let Some(last) = last {
+            let found = layers.iter().position(|l| l == last || l.split_once('-').is_some_and(|p| p.1 == last));
+            let count = found.ok_or_else(|| {
+                StudioError::Usage(format!("{} has no layer {last}; it has {}", root.display(), layers.join(", ")))
+            })?;
+            layers.truncate(count + 1);
+        }
+        let name = subject.name().to_string();
+        let lock = lock(root)?;
+        let folders = Folders::new(root);
+        Ok(Self { folders, layers, progress, subject: Some(subject), name, left_out: Vec::new(), _lock: lock })
+    }
+
+    /// Over a single file; records name paths relative to `root`.
+    pub fn single(root: &Path, name: &str, progress: &'a Progress) -> Self {
+        let (folders, name) = (Folders::new(root), name.to_string());
+        Self { folders, layers: Vec::new(), progress, subject: None, name, left_out: Vec::new(), _lock: None }
+    }
+
+    /// Tells the progress what lies ahead.
+    pub fn plan(&self, goal: Goal) {
+        let (takes, garments) = (self.layers.len() as f64, self.layers.len().saturating_sub(1) as f64);
+        let costs = [
+            (Goal::Scans, takes * fuse::COST),
+            (Goal::Body, fit::COST),
+            (Goal::Garments, garments * (pose::COST + cut::COST + stack::COST)),
+            (Goal::Avatar, deliverables::COST),
+            (Goal::Report, page::COST),
+        ];
+        self.progress.plan(costs.iter().filter(|c| c.0 <= goal).map(|c| c.1).sum());
+    }
+
+    /// What a step is called while it runs.
+    pub fn label(&self, layer: &str, stage: &str) -> String {
+        if self.name == layer { format!("{layer}: {stage}") } else { format!("{} {layer}: {stage}", self.name) }
+    }
+
+    /// Folder name of the body take.
+    pub fn first_layer(&self) -> &str {
+        self.layers.first().map_or("00-body", String::as_str)
+    }
+
+    /// Folder names of the garments in the avatar, inside to outside.
+    pub fn garments(&self) -> impl Iterator<Item = &str> {
+        self.layers.iter().skip(1).filter(|l| !self.left_out.contains(l)).map(String::as_str)
+    }
+
+    /// Leaves a layer in which nothing new was found out of the avatar, with what an earlier run made of it.
+    ///
+    /// # Errors
+    /// [`StudioError::Io`] where an old file cannot be removed.
+    pub fn leave_out(&mut self, layer: &str) -> Result<(), StudioError> {
+        for path in [self.folders.cut(layer), self.folders.unstacked(layer), self.folders.garment(layer)] {
+            if path.exists() {
+                fs::remove_file(&path).map_err(|e| StudioError::io(&path, e))?;
+            }
+        }
+        self.left_out.push(layer.to_string());
+        Ok(())
+    }
+
+    /// What the subject is called.
+    pub fn title(&self) -> &str {
+        &self.name
+    }
+
+    /// Date, rig and number of takes in a line.
+    pub fn subtitle(&self) -> String {
+        let count = format!("{} takes", self.layers.len());
+        let (date, rig) = self.subject.as_ref().map_or(("", ""), |s| (s.date(), s.rig()));
+        [date, rig, &count].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" · ")
+    }
+
+    /// The type of the garment that take `n` added, where it is known.
+    pub fn garment_type(&self, n: usize) -> Option<GarmentType> {
+        let layer = self.subject.as_ref()?.layers().get(n)?;
+        layer.garment?.name().parse().ok()
+    }
+
+    /// The recording of a take.
+    pub fn take(&self, layer: &str) -> PathBuf {
+        self.folders.root.join("takes").join(format!("{layer}.mcap"))
+    }
+
+    /// Reads a mesh, or says which file cannot be read.
+    ///
+    /// # Errors
+    /// [`StudioError`] where the file is missing or no mesh.
+    pub fn read_mesh(&self, path: &Path) -> Result<Mesh, StudioError> {
+        Ok(ply::read(path)?)
+    }
+}
+
+/// Locks the subject's folder until the file is dropped; `None` where the file system knows no locks.
+fn lock(root: &Path) -> Result<Option<File>, StudioError> {
+    let folder = File::open(root).map_err(|e| StudioError::io(root, e))?;
+    match folder.try_lock() {
+        Ok(()) => Ok(Some(folder)),
+        Err(TryLockError::WouldBlock) => Err(StudioError::Busy { path: root.to_path_buf() }),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_subject_is_worked_on_by_one_run_at_a_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let first = lock(dir.path()).unwrap();
+        assert!(matches!(lock(dir.path()), Err(StudioError::Busy { .. })));
+        drop(first);
+        assert!(lock(dir.path()).is_ok());
+    }
+}

@@ -1,0 +1,109 @@
+//! What the report tells, and in which order.
+
+use std::{collections::BTreeMap, path::Path};
+
+use toile_geometry::Mesh;
+use toile_render::RenderError;
+
+use crate::{
+    StudioError,
+    report::{
+        page::{Page, Picture},
+        pictures,
+    },
+};
+
+/// Everything that the report shows.
+pub struct Contents {
+    /// Name of the subject.
+    pub name: String,
+    /// Date, number of takes and the like, in one line.
+    pub subtitle: String,
+    /// One row a take.
+    pub takes: Vec<TakeRow>,
+    /// Measurements: what, and its value with unit.
+    pub measurements: Vec<(String, String)>,
+    /// What to worry about.
+    pub warnings: Vec<String>,
+    /// Recorded data that was lost.
+    pub lost: Vec<String>,
+    /// What failed.
+    pub failures: Vec<String>,
+    /// Scan of each take by layer name.
+    pub scans: Vec<(String, Mesh)>,
+    /// The conformed body in scan 0's pose and frame.
+    pub body: Mesh,
+    /// The garments in the same pose and frame by layer name.
+    pub garments: Vec<(String, Mesh)>,
+    /// All layers at some times of the motion, with a caption each.
+    pub motion: Vec<(String, Vec<Mesh>)>,
+    /// Seconds by stage name.
+    pub seconds: BTreeMap<String, f64>,
+}
+
+/// What the report says of a take in a line.
+pub struct TakeRow {
+    /// Name of the layer.
+    pub layer: String,
+    /// Column and value, the same columns in every row.
+    pub cells: Vec<(&'static str, String)>,
+}
+
+/// The page as HTML.
+///
+/// # Errors
+/// [`StudioError::Stage`] where a picture cannot be drawn.
+pub fn write(contents: &Contents, at: &Path, progress: &(dyn Fn(f32) + Sync)) -> Result<String, StudioError> {
+    let drawn = |pictures: Result<Vec<Picture>, RenderError>| pictures.map_err(|e| StudioError::stage(at, e));
+    let mut page = Page::new(&contents.name, &contents.subtitle);
+    worries(&mut page, contents);
+    page.section("The avatar", "All layers in the pose of the first scan, then in motion.");
+    let layers: Vec<&Mesh> = std::iter::once(&contents.body).chain(contents.garments.iter().map(|g| &g.1)).collect();
+    page.pictures(&drawn(pictures::dressed(&layers))?)?;
+    page.pictures(&drawn(pictures::motion(&contents.motion))?)?;
+    progress(0.3);
+    page.section("Takes", "One turn of the table each; every take adds a layer.");
+    takes_table(&mut page, &contents.takes);
+    for (layer, scan) in &contents.scans {
+        page.subsection(layer);
+        page.pictures(&drawn(pictures::scan(scan))?)?;
+    }
+    progress(0.6);
+    page.section("Body", "The body fitted to the first scan. Dark is close, bright is far from it.");
+    if let Some((_, scan)) = contents.scans.first() {
+        page.pictures(&drawn(pictures::body_over_scan(scan, &contents.body))?)?;
+    }
+    let rows: Vec<Vec<String>> = contents.measurements.iter().map(|(k, v)| vec![k.clone(), v.clone()]).collect();
+    page.table(&["measurement", "value"], &rows);
+    progress(0.8);
+    page.section("Garments", "Each as it was cut out, alone and on the body.");
+    for (layer, garment) in &contents.garments {
+        page.subsection(layer);
+        page.pictures(&drawn(pictures::garment(garment, &contents.body))?)?;
+    }
+    page.section("Time", "Seconds of each stage when it last ran.");
+    let rows: Vec<Vec<String>> = contents.seconds.iter().map(|(k, v)| vec![k.clone(), format!("{v:.1}")]).collect();
+    page.table(&["stage", "seconds"], &rows);
+    Ok(page.finish())
+}
+
+fn worries(page: &mut Page, contents: &Contents) {
+    page.section("What to worry about", "");
+    let quiet = contents.failures.is_empty() && contents.lost.is_empty() && contents.warnings.is_empty();
+    page.notes("bad", &contents.failures);
+    page.notes("bad", &contents.lost);
+    page.notes("warn", &contents.warnings);
+    if quiet {
+        page.notes("good", &["Nothing: every take is whole, every stage trusts its result.".into()]);
+    }
+}
+
+fn takes_table(page: &mut Page, takes: &[TakeRow]) {
+    let Some(first) = takes.first() else { return };
+    let head: Vec<&str> = std::iter::once("take").chain(first.cells.iter().map(|c| c.0)).collect();
+    let rows: Vec<Vec<String>> = takes
+        .iter()
+        .map(|t| std::iter::once(t.layer.clone()).chain(t.cells.iter().map(|c| c.1.clone())).collect())
+        .collect();
+    page.table(&head, &rows);
+}

@@ -1,0 +1,115 @@
+//! The pictures of a report.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::Point3;
+use rayon::prelude::*;
+use toile_geometry::{Mesh, bvh::Bvh};
+use toile_render::{Drawn, RenderError, View, picture, sheet};
+
+use crate::report::page::Picture;
+
+/// Size of a picture of a whole person, pixels.
+const SIZE: (u32, u32) = (300, 440);
+/// Distances between body and scan are drawn from 0 to this, millimetres.
+const DISTANCE_RANGE_MM: f32 = 15.0;
+/// Name of the attribute that holds them.
+const DISTANCE: &str = "distance_mm";
+/// Colour of the body under a garment.
+const SKIN: [u8; 3] = [205, 190, 178];
+
+/// Corners of the box around all `meshes`; `None` where they are empty.
+pub fn bounds<'a>(meshes: impl IntoIterator<Item = &'a Mesh>) -> Option<(Point3<f32>, Point3<f32>)> {
+    meshes.into_iter().filter_map(Mesh::bounds).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)))
+}
+
+/// A mesh in its colours from front, side and back, and in grey.
+///
+/// # Errors
+/// [`RenderError`] where the mesh cannot be drawn.
+pub fn scan(mesh: &Mesh) -> Result<Vec<Picture>, RenderError> {
+    let mut pictures = turn(&[Drawn::colored(mesh)], &["front", "left side", "back"])?;
+    pictures.push(one(&[Drawn::clay(mesh)], &View::around(0.5, 0.1), "shape")?);
+    Ok(pictures)
+}
+
+/// The body over the scan: how far every point of the scan is from the body, front and back, and both together.
+///
+/// # Errors
+/// [`RenderError`] where a mesh cannot be drawn.
+pub fn body_over_scan(scan: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderError> {
+    let mapped = with_distances(scan, body);
+    let range = (0.0, DISTANCE_RANGE_MM);
+    let mut pictures = Vec::new();
+    for (heading, name) in [(0.0, "front"), (PI, "back")] {
+        let drawn = [Drawn::attribute(&mapped, DISTANCE, range)];
+        let mut picture = one(&drawn, &View::around(heading, 0.0), &format!("scan to body, mm, {name}"))?;
+        picture.image = sheet::scale_bar(&picture.image, range, "mm");
+        pictures.push(picture);
+    }
+    pictures.push(one(&[Drawn::clay(body)], &View::front(), "body, front")?);
+    pictures.push(one(&[Drawn::clay(body)], &View::around(FRAC_PI_2, 0.0), "body, left side")?);
+    Ok(pictures)
+}
+
+/// A garment alone (front and back) and on what is worn below it.
+///
+/// # Errors
+/// [`RenderError`] where a mesh cannot be drawn.
+pub fn garment(garment: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderError> {
+    let mut pictures = vec![
+        one(&[Drawn::colored(garment)], &View::front(), "alone, front")?,
+        one(&[Drawn::colored(garment)], &View::around(PI, 0.0), "alone, back")?,
+    ];
+    let on_body = [Drawn::solid(body, SKIN, 1.0), Drawn::colored(garment)];
+    pictures.push(one(&on_body, &View::front(), "on the body, front")?);
+    pictures.push(one(&on_body, &View::around(PI, 0.0), "on the body, back")?);
+    Ok(pictures)
+}
+
+/// All layers together from front, side and back.
+///
+/// # Errors
+/// [`RenderError`] where a mesh cannot be drawn.
+pub fn dressed(layers: &[&Mesh]) -> Result<Vec<Picture>, RenderError> {
+    let drawn: Vec<Drawn> = layers.iter().map(|m| Drawn::colored(m)).collect();
+    turn(&drawn, &["front", "left side", "back"])
+}
+
+/// All layers at several times of a motion, each time framed by itself.
+///
+/// # Errors
+/// [`RenderError`] where a mesh cannot be drawn.
+pub fn motion(frames: &[(String, Vec<Mesh>)]) -> Result<Vec<Picture>, RenderError> {
+    let framed = |(caption, layers): &(String, Vec<Mesh>)| {
+        let drawn: Vec<Drawn> = layers.iter().map(Drawn::colored).collect();
+        one(&drawn, &View::around(0.6, 0.1), caption)
+    };
+    frames.iter().map(framed).collect()
+}
+
+/// The mesh with its vertices' distances to `body` in millimetres.
+fn with_distances(scan: &Mesh, body: &Mesh) -> Mesh {
+    let bvh = Bvh::new(&body.positions, &body.triangles);
+    let distance = |p: &Point3<f32>| bvh.closest(p, f32::INFINITY).map_or(f32::NAN, |hit| hit.distance * 1e3);
+    let mut mapped = scan.clone();
+    mapped.attributes.insert(DISTANCE.into(), scan.positions.par_iter().map(distance).collect());
+    mapped
+}
+
+fn turn(drawn: &[Drawn], names: &[&str; 3]) -> Result<Vec<Picture>, RenderError> {
+    let box_of_all = bounds(drawn.iter().map(|d| d.mesh));
+    let headings = [0.0, FRAC_PI_2, PI];
+    headings
+        .iter()
+        .zip(names)
+        .map(|(&heading, name)| {
+            let view = View { bounds: box_of_all, ..View::around(heading, 0.0) };
+            one(drawn, &view, name)
+        })
+        .collect()
+}
+
+fn one(drawn: &[Drawn], view: &View, caption: &str) -> Result<Picture, RenderError> {
+    Ok(Picture { caption: caption.into(), image: picture(drawn, view, SIZE.0, SIZE.1)? })
+}

@@ -1,0 +1,163 @@
+//! One run of the program: words in, answer out.
+
+use std::{
+    ffi::OsString,
+    io::{self, Write},
+    sync::Arc,
+};
+
+use clap::{Parser, error::ErrorKind};
+use tracing_subscriber::{EnvFilter, fmt::MakeWriter};
+
+use crate::{
+    Outcome, Progress, StudioError,
+    cli::{Cli, Command, Globals},
+    outcome::{Answer, document},
+    stage,
+};
+
+/// What every command is given.
+pub struct Session {
+    /// The options that every command takes.
+    pub globals: Globals,
+    /// Where progress is shown.
+    pub progress: Arc<Progress>,
+}
+
+/// Parses the command line, does what it says, and prints the answer.
+pub fn run(words: impl IntoIterator<Item = OsString>) -> Outcome {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let cli = match Cli::try_parse_from(&words) {
+        Ok(cli) => cli,
+        Err(error) => return not_understood(&error, words.iter().any(|w| w == "--json")),
+    };
+    let session = Session { progress: Arc::new(Progress::new(cli.globals.quiet)), globals: cli.globals };
+    start_log(&session);
+    let answer = start_threads(session.globals.threads).and_then(|()| cli.command.run(&session));
+    session.progress.finish();
+    print(cli.command.name(), &answer, &session.globals);
+    Outcome::of(&answer)
+}
+
+impl Command {
+    fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        match self {
+            Self::Import(c) => c.run(session),
+            Self::Inspect(c) => c.run(session),
+            Self::Fuse(c) => c.run(session),
+            Self::Fit(c) => c.run(session),
+            Self::Extract(c) => c.run(session),
+            Self::Export(c) => c.run(session),
+            Self::Process(c) => c.run(session),
+            Self::Demo(c) => c.run(session),
+            Self::Synthesize(c) => c.run(session),
+            Self::Completions(c) => c.run(),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Import(_) => "import",
+            Self::Inspect(_) => "inspect",
+            Self::Fuse(_) => "fuse",
+            Self::Fit(_) => "fit",
+            Self::Extract(_) => "extract",
+            Self::Export(_) => "export",
+            Self::Process(_) => "process",
+            Self::Demo(_) => "demo",
+            Self::Synthesize(_) => "synthesize",
+            Self::Completions(_) => "completions",
+        }
+    }
+}
+
+/// Help and version are answers; everything else that clap refuses is a wrong command line.
+fn not_understood(error: &clap::Error, json: bool) -> Outcome {
+    if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {
+        drop(error.print());
+        return Outcome::Done;
+    }
+    if json {
+        let text = error.to_string();
+        let message = text.trim().trim_start_matches("error: ").to_string();
+        say(&document("", &Err(StudioError::Usage(message))));
+    } else {
+        drop(error.print());
+    }
+    Outcome::Usage
+}
+
+fn start_threads(threads: usize) -> Result<(), StudioError> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global()
+        .map_err(|e| StudioError::Usage(format!("--threads {threads}: {e}")))
+}
+
+fn start_log(session: &Session) {
+    let level = match (session.globals.quiet, session.globals.verbose) {
+        (true, _) => "error",
+        (_, 0) => "warn",
+        (_, 1) => "info",
+        (_, 2) => "debug",
+        _ => "trace",
+    };
+    let filter = EnvFilter::try_from_env("TOILE_LOG").unwrap_or_else(|_| EnvFilter::new(level));
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(BesideTheBar(session.progress.clone()))
+        .with_target(false)
+        .without_time();
+    // A second run in the same process (tests) keeps the first one's log.
+    drop(log.try_init());
+}
+
+fn print(command: &str, answer: &Result<Answer, StudioError>, globals: &Globals) {
+    if globals.json {
+        return say(&document(command, answer));
+    }
+    match answer {
+        Err(error) => eprintln!("error: {error}"),
+        Ok(answer) => {
+            let text = answer.text.trim_end();
+            if !text.is_empty() {
+                drop(writeln!(io::stdout(), "{text}"));
+            }
+            if !globals.quiet {
+                answer.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+            }
+            answer.lost.iter().for_each(|l| eprintln!("lost: {l}"));
+            answer.failures.iter().for_each(|f| eprintln!("failed: {f}"));
+        }
+    }
+}
+
+fn say(document: &serde_json::Value) {
+    let bytes = stage::pretty(document).unwrap_or_default();
+    // A reader that went away is no failure of ours.
+    drop(io::stdout().write_all(&bytes));
+}
+
+/// Log lines that do not tear the progress bar.
+struct BesideTheBar(Arc<Progress>);
+
+struct Line(Arc<Progress>);
+
+impl<'a> MakeWriter<'a> for BesideTheBar {
+    type Writer = Line;
+
+    fn make_writer(&'a self) -> Line {
+        Line(self.0.clone())
+    }
+}
+
+impl Write for Line {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.say(String::from_utf8_lossy(bytes).trim_end());
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,147 @@
+//! Recordings that are not as they should be: one clear sentence, the right exit code, nothing lost or half-written.
+
+mod common;
+
+use std::fs;
+
+use common::{Recording, exits, toile};
+
+#[test]
+fn a_whole_folder_is_imported_without_a_word_of_warning() {
+    let recording = Recording::new(6, 6);
+    let answer = exits(0, toile().args(recording.import("body")));
+    assert_eq!(answer["warnings"].as_array().map(Vec::len), Some(0), "{answer}");
+    assert!(recording.subject().join("takes/00-body.mcap").is_file());
+    let answer = exits(0, toile().arg("inspect").arg(recording.subject()));
+    assert!(answer.to_string().contains("00-body"), "{answer}");
+}
+
+#[test]
+fn missing_frames_are_counted_and_the_rest_is_kept() {
+    let recording = Recording::new(6, 6);
+    for file in ["depth/000003.png", "color/000003.png"] {
+        fs::remove_file(recording.folder().join(file)).unwrap();
+    }
+    let answer = exits(3, toile().args(recording.import("body")));
+    let lost = answer["lost"].to_string();
+    assert!(lost.contains("000003") || lost.contains("frame 3") || lost.contains("1 frame"), "{answer}");
+    assert!(recording.subject().join("takes/00-body.mcap").is_file());
+}
+
+#[test]
+fn unequal_counts_of_depth_and_colour_are_told() {
+    let recording = Recording::new(6, 4);
+    let answer = exits(3, toile().args(recording.import("body")));
+    let lost = answer["lost"].to_string();
+    assert!(lost.contains('6') && lost.contains('4'), "{answer}");
+}
+
+#[test]
+fn a_wrong_camera_field_is_named() {
+    for (field, value) in [("fx", "\"wide\""), ("fx", "-1.0"), ("width", "0"), ("depth_scale", "null")] {
+        let recording = Recording::new(3, 3);
+        recording.set_camera(field, Some(value));
+        let answer = exits(1, toile().args(recording.import("body")));
+        let message = answer["error"]["message"].as_str().unwrap();
+        assert!(message.contains("camera.json") && message.contains(field), "{field} = {value}: {message}");
+        assert!(recording.nothing_was_written(), "{field} = {value}");
+    }
+}
+
+#[test]
+fn a_missing_camera_field_is_named() {
+    for field in ["fx", "cy", "height"] {
+        let recording = Recording::new(3, 3);
+        recording.set_camera(field, None);
+        let message = exits(1, toile().args(recording.import("body")))["error"]["message"].to_string();
+        assert!(message.contains("camera.json") && message.contains(field), "{field}: {message}");
+        assert!(recording.nothing_was_written());
+    }
+}
+
+#[test]
+fn a_camera_of_another_size_than_the_pictures_is_refused() {
+    let recording = Recording::new(3, 3);
+    recording.set_camera("width", Some("640"));
+    let message = exits(1, toile().args(recording.import("body")))["error"]["message"].to_string();
+    assert!(message.contains("640"), "{message}");
+    assert!(recording.nothing_was_written());
+}
+
+#[test]
+fn a_torn_picture_is_named() {
+    let recording = Recording::new(4, 4);
+    let path = recording.folder().join("depth/000002.png");
+    let bytes = fs::read(&path).unwrap();
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    let done = toile().args(recording.import("body")).output().unwrap();
+    let text = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(matches!(done.status.code(), Some(1 | 3)) && text.contains("000002"), "{text}");
+}
+
+#[test]
+fn an_empty_folder_says_what_is_expected() {
+    let recording = Recording::new(0, 0);
+    let message = exits(1, toile().args(recording.import("body")))["error"]["message"].to_string();
+    assert!(message.contains("recording"), "{message}");
+    assert!(recording.nothing_was_written());
+}
+
+#[test]
+fn an_empty_mcap_and_a_foreign_one_are_told_apart_from_ours() {
+    let dir = tempfile::tempdir().unwrap();
+    let magic = b"\x89MCAP0\r\n";
+    for (name, bytes, says) in [
+        ("empty.mcap", &b""[..], "empty"),
+        ("text.mcap", b"this is a letter to my aunt", "MCAP"),
+        ("cut.mcap", magic, "cut off"),
+    ] {
+        let path = dir.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        for command in ["inspect", "fuse"] {
+            let message = exits(1, toile().arg(command).arg(&path))["error"]["message"].to_string();
+            assert!(message.contains(says) && message.contains(name), "{command}: {message}");
+        }
+    }
+}
+
+#[test]
+fn a_torn_recording_is_read_as_far_as_it_goes_and_exits_with_3() {
+    let recording = Recording::with_noise(40);
+    exits(0, toile().args(recording.import("body")));
+    let take = recording.subject().join("takes/00-body.mcap");
+    let bytes = fs::read(&take).unwrap();
+    fs::write(&take, &bytes[..bytes.len() * 2 / 3]).unwrap();
+    let answer = exits(3, toile().arg("inspect").arg(&take));
+    assert!(answer["lost"].to_string().contains("frames were read"), "{answer}");
+}
+
+#[test]
+fn a_layer_is_not_overwritten_but_retaken() {
+    let recording = Recording::new(3, 3);
+    exits(0, toile().args(recording.import("body")));
+    let take = recording.subject().join("takes/00-body.mcap");
+    let before = fs::read(&take).unwrap();
+    let message = exits(1, toile().args(recording.import("body")))["error"]["message"].to_string();
+    assert!(message.contains("--retake"), "{message}");
+    assert_eq!(fs::read(&take).unwrap(), before);
+    exits(0, toile().args(recording.import("body")).arg("--retake"));
+    let rejected = fs::read_dir(recording.subject().join("takes/rejected")).unwrap().count();
+    assert_eq!(rejected, 1);
+}
+
+#[test]
+fn a_full_disk_at_import_leaves_nothing_half_written() {
+    let recording = Recording::with_noise(4);
+    let takes = recording.subject().join("takes");
+    fs::create_dir_all(&takes).unwrap();
+    std::os::unix::fs::symlink("/dev/full", takes.join("00-body.mcap.part")).unwrap();
+    // An import replaces an old .part, so the disk is made full by a limit on the size of files instead.
+    let mut limited = std::process::Command::new("sh");
+    let words = recording.import("body").join(" ");
+    limited.arg("-c").arg(format!("ulimit -f 8; trap '' XFSZ; exec {} {words}", env!("CARGO_BIN_EXE_toile")));
+    let answer = exits(1, &mut limited);
+    let message = answer["error"]["message"].as_str().unwrap();
+    assert!(message.contains("disk") && message.contains("free some space"), "{message}");
+    assert!(!takes.join("00-body.mcap").exists());
+}

@@ -1,0 +1,177 @@
+//! The recorded session, end to end: every layer is there, any number of threads and any interruption give the same
+//! bytes, and outside programs accept the files.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    sync::OnceLock,
+    time::Duration,
+};
+
+use serde_json::Value;
+
+/// Files that may differ between two runs.
+const MAY_DIFFER: [&str; 2] = ["timings.json", "report.html"];
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn toile(words: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_toile-under-test"));
+    command.args(words).stderr(Stdio::null());
+    command
+}
+
+/// The demo of the shipped session, made once with two threads; `None` where there is no session.
+fn demo() -> Option<&'static Path> {
+    static MADE: OnceLock<Option<(tempfile::TempDir, PathBuf)>> = OnceLock::new();
+    let made = MADE.get_or_init(|| {
+        let dir = tempfile::tempdir().unwrap();
+        let subject = run_demo(dir.path(), "2")?;
+        Some((dir, subject))
+    });
+    if made.is_none() {
+        println!("skipped: no recorded session in recorded/");
+    }
+    made.as_ref().map(|m| m.1.as_path())
+}
+
+fn run_demo(out: &Path, threads: &str) -> Option<PathBuf> {
+    let recorded = workspace().join("recorded");
+    let has_session = fs::read_dir(&recorded).ok()?.flatten().any(|e| e.path().join("subject.toml").exists());
+    if !has_session {
+        return None;
+    }
+    let words = ["demo", "--recorded", recorded.to_str()?, "--out", out.to_str()?, "--threads", threads, "--json"];
+    let done = toile(&words).output().unwrap();
+    let answer: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(done.status.code(), Some(0), "{answer}");
+    Some(fs::read_dir(out).unwrap().flatten().map(|e| e.path()).min().unwrap())
+}
+
+/// Every file below a folder by its relative path, but for those that may differ.
+fn files(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![root.to_path_buf()];
+    while let Some(folder) = open.pop() {
+        for path in fs::read_dir(&folder).unwrap().flatten().map(|e| e.path()) {
+            if path.is_dir() {
+                open.push(path);
+            } else if !MAY_DIFFER.iter().any(|name| path.ends_with(name)) {
+                found.insert(path.strip_prefix(root).unwrap().to_path_buf(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+fn assert_same(a: &Path, b: &Path) {
+    let (a, b) = (files(a), files(b));
+    let names = |files: &BTreeMap<PathBuf, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&a), names(&b));
+    let differing: Vec<_> = a.iter().filter(|(name, bytes)| b[*name] != **bytes).map(|(name, _)| name).collect();
+    assert!(differing.is_empty(), "these differ: {differing:?}");
+}
+
+/// The JSON part of a GLB file.
+fn glb_json(path: &Path) -> Value {
+    let bytes = fs::read(path).unwrap();
+    assert_eq!(&bytes[..4], b"glTF");
+    let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    serde_json::from_slice(&bytes[20..20 + length]).unwrap()
+}
+
+#[test]
+fn every_take_is_a_layer_of_the_avatar() {
+    let Some(subject) = demo() else { return };
+    let mut wanted: Vec<String> = fs::read_dir(subject.join("takes"))
+        .unwrap()
+        .flatten()
+        .filter_map(|e| e.file_name().to_str()?.strip_suffix(".mcap").map(str::to_string))
+        .collect();
+    wanted.sort();
+    wanted[0] = "body".into();
+    let gltf = glb_json(&subject.join("avatar.glb"));
+    let nodes = gltf["nodes"].as_array().unwrap();
+    let mut layers: Vec<&str> =
+        nodes.iter().filter(|n| n.get("mesh").is_some()).map(|n| n["name"].as_str().unwrap()).collect();
+    layers.sort_by_key(|name| (*name != "body", name.to_string()));
+    assert_eq!(layers, wanted);
+    assert_eq!(gltf["animations"].as_array().unwrap().len(), 1, "the walk is in it");
+    for file in ["avatar.vrm", "report.html", "build/body/body.json", "build/body/rigged_scan.glb"] {
+        assert!(subject.join(file).is_file(), "{file} is missing");
+    }
+}
+
+#[test]
+fn one_thread_and_three_kills_give_the_same_bytes() {
+    let Some(subject) = demo() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let copy = dir.path().join(subject.file_name().unwrap());
+    fs::create_dir_all(copy.join("takes")).unwrap();
+    fs::copy(subject.join("subject.toml"), copy.join("subject.toml")).unwrap();
+    for take in fs::read_dir(subject.join("takes")).unwrap().flatten() {
+        fs::copy(take.path(), copy.join("takes").join(take.file_name())).unwrap();
+    }
+    let words = ["process", copy.to_str().unwrap(), "--threads", "1", "--quiet"];
+    for seconds in [1.0, 5.0, 9.0] {
+        let mut child = toile(&words).stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs_f64(seconds));
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+    assert_eq!(toile(&words).status().unwrap().code(), Some(0));
+    assert_same(subject, &copy);
+}
+
+#[test]
+fn a_second_run_does_nothing() {
+    let Some(subject) = demo() else { return };
+    let times = || -> BTreeMap<PathBuf, _> {
+        let of = |p: &PathBuf| fs::metadata(subject.join(p)).unwrap().modified().unwrap();
+        files(subject).into_keys().map(|p| (p.clone(), of(&p))).collect()
+    };
+    let before = times();
+    assert_eq!(toile(&["process", subject.to_str().unwrap(), "--quiet"]).status().unwrap().code(), Some(0));
+    assert_eq!(times(), before);
+}
+
+#[test]
+fn khronos_validator_finds_nothing() {
+    let Some(subject) = demo() else { return };
+    let modules = workspace().join("target/outside/node_modules");
+    if !modules.join("gltf-validator").exists() {
+        println!("skipped: no gltf-validator in target/outside (make test installs it)");
+        return;
+    }
+    let files = ["avatar.glb", "avatar.vrm", "build/body/rigged_scan.glb"].map(|f| subject.join(f));
+    let done = Command::new("node")
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("validate_gltf.cjs"))
+        .args(&files)
+        .env("NODE_PATH", &modules)
+        .output()
+        .unwrap();
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    for (file, issues) in report.as_object().unwrap() {
+        assert_eq!((&issues["errors"], &issues["warnings"]), (&0.into(), &0.into()), "{file}: {}", issues["messages"]);
+    }
+}
+
+#[test]
+fn assimp_loads_every_layer_and_the_clip() {
+    let Some(subject) = demo() else { return };
+    let Ok(done) = Command::new("assimp").arg("info").arg(subject.join("avatar.glb")).output() else {
+        println!("skipped: no assimp here (make test installs it)");
+        return;
+    };
+    let text = String::from_utf8_lossy(&done.stdout);
+    let count = |label: &str| -> Option<usize> {
+        text.lines().find_map(|l| l.strip_prefix(label)).and_then(|n| n.trim().parse().ok())
+    };
+    let takes = fs::read_dir(subject.join("takes")).unwrap().count();
+    assert_eq!((count("Meshes:"), count("Animations:")), (Some(takes), Some(1)), "{text}");
+    assert_eq!(count("Bones:"), Some(52 * takes), "{text}");
+}
