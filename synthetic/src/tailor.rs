@@ -109,7 +109,7 @@ impl Tailoring {
             GarmentKind::Trousers => measure.bottoms(0.93 + 0.01 * vary, 0.010, 0.025),
             GarmentKind::Shorts => measure.bottoms(0.42 + 0.03 * vary, 0.011, 0.05),
             GarmentKind::Skirt => measure.skirt(0.9 + 0.06 * vary),
-            GarmentKind::Tshirt => measure.top(0.30 + 0.02 * vary, 0.05, 0.010, 0.6),
+            GarmentKind::Tshirt => measure.top(0.38 + 0.02 * vary, 0.05, 0.010, 0.6),
             GarmentKind::Blouse => measure.top(0.86 + 0.02 * vary, 0.03, 0.010, 0.6),
             GarmentKind::Jumper => measure.top(0.92, 0.045, 0.013, 0.8),
             GarmentKind::Jacket => measure.open_top(0.93, 0.07, 0.014),
@@ -194,7 +194,8 @@ impl Measure<'_> {
     /// A round neckline `wide` metres off the root of the neck.
     fn neckline(&self, wide: f32) -> Neckline {
         let (nape, throat) = (self.landmark("cervicale"), self.landmark("suprasternale"));
-        let center = nalgebra::center(&nape, &throat);
+        let forward = (throat - nape).try_normalize(1e-6).unwrap_or(Vector3::z()) * (0.6 * wide);
+        let center = nalgebra::center(&nape, &throat) + forward;
         Neckline { center, radius: 0.5 * (nape - throat).norm() + wide, highest: nape.y + 0.012 }
     }
 

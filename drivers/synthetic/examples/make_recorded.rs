@@ -11,7 +11,7 @@ fn rowan() -> SyntheticSettings {
     let garment = |kind, pattern| GarmentSettings { kind, pattern };
     SyntheticSettings {
         name: "rowan".into(),
-        seed: 11,
+        seed: 33,
         sex: Sex::Female,
         variety: 0.45,
         garments: vec![
