@@ -25,6 +25,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         pose = under.pose;
         ply::write(&out.join(format!("{}-body.ply", n + 1)), &fit.body.posed_mesh(&pose))?;
         ply::write(&out.join(format!("{}-dressed.ply", n + 1)), &dressed.posed_mesh(&pose))?;
+        let joints: std::collections::BTreeMap<_, [f64; 3]> = toile_character::joint::JOINTS
+            .iter()
+            .zip(pose.joint_positions(&fit.skeleton))
+            .map(|(j, p)| (j.name(), p.into()))
+            .collect();
+        std::fs::write(out.join(format!("{}-joints.json", n + 1)), serde_json::to_string(&joints)?)?;
         dressed = rigged_scan(&scan, &fit.body, &pose);
     }
     Ok(())

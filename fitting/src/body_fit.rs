@@ -11,7 +11,7 @@ use crate::{
     conform::{Conformed, conform},
     correspond::Gate,
     level::{Level, LevelResult, body_joints},
-    measure::{Measurements, measure},
+    measure::{Measurements, measure, stature},
     prepare::{Prepared, prepare},
     prior::JointPrior,
     stance::standing,
@@ -201,6 +201,25 @@ impl Resolution {
     }
 }
 
+/// Stature of the body standing straight, girths as it stood in the scan: skin around hips and armpits keeps its shape
+/// there. Arms that hang down would join the section, so they are lifted to the A-pose first.
+fn measured(model: &BodyModel, body: &SkinnedMesh, pose: &Pose) -> Measurements {
+    use toile_character::Joint::*;
+    let stature = stature(&standing(body), &model.inner);
+    let joints = pose.joint_positions(&body.skeleton);
+    let mut lifted = pose.clone();
+    for (shoulder, elbow) in [(LeftUpperArm, LeftLowerArm), (RightUpperArm, RightLowerArm)] {
+        let arm = joints[elbow.index()] - joints[shoulder.index()];
+        if -arm.y > ARM_CLEAR * arm.norm() {
+            *lifted.rotation_mut(shoulder) = nalgebra::UnitQuaternion::identity();
+        }
+    }
+    measure(&body.posed_mesh(&lifted), &model.inner, stature)
+}
+
+/// Cosine of the least angle between a hanging arm and the vertical that keeps it clear of the trunk (25°).
+const ARM_CLEAR: f64 = 0.906;
+
 struct Context {
     prepared: Prepared,
     mend: Mend,
@@ -224,7 +243,7 @@ fn assemble(
     let mut model_mesh = Mesh::new(model.posed(&beta, &pose), model.triangles.clone());
     model_mesh.recompute_normals();
     let body = SkinnedMesh { mesh, skeleton: skeleton.clone(), weights: model.weights.clone() };
-    let measurements = measure(&standing(&body), &model.inner);
+    let measurements = measured(model, &body, &pose);
     let mut notices = context.prepared.notices;
     if context.mend.rotation.angle() > 1e-9 {
         notices.push("the scan does not stand on +Y; turned upright".into());

@@ -2,7 +2,8 @@
 //! energy (Volino et al.'s V-Man, papers 004 §2.1.2; the mass–spring relaxation is replaced by one sparse solve).
 //!
 //! Minimised over the displacement d of all vertices, with vertex areas M and the cotangent Laplacian C:
-//! Σ Mᵢ wᵢ |dᵢ − δᵢ|² + (C ℓ² d)ᵀ M⁻¹ (C ℓ² d) + ε dᵀ M d. Details finer than about six times ℓ are left out.
+//! Σ Mᵢ wᵢ |dᵢ − δᵢ|² + (C ℓ² d)ᵀ M⁻¹ (C ℓ² d) + m² dᵀ C d + ε dᵀ M d. Details finer than about six times ℓ are left
+//! out (bending); over holes the displacement of the rim is carried on without its slope (membrane, m).
 
 use faer::{
     Mat, Side,
@@ -24,7 +25,9 @@ use toile_geometry::{
 use crate::{ConformSettings, FitSettings, FittingError, articulated::State};
 
 /// Draws an unseen vertex back to the statistical model.
-const TIE: f64 = 1e-4;
+const TIE: f64 = 2e-5;
+/// Length of the membrane energy, metres: too short to smooth what was seen, enough to rule over wide holes.
+const MEMBRANE: f64 = 0.002;
 /// A triangle that turned by more than this cosine from the model's is taken for folded.
 const FOLD_COS: f32 = 0.2;
 
@@ -129,8 +132,9 @@ impl Elastic {
         let mesh = Mesh::new(points.to_vec(), model.triangles.clone());
         let floor = 1e-7; // a degenerate triangle must not make a vertex infinitely stiff
         let areas: Vec<f64> = crate::cloud::vertex_areas(&mesh).iter().map(|&a| f64::from(a).max(floor)).collect();
-        let rows = scaled_laplacian(model, points, &areas, settings);
-        let entries = squared(&rows);
+        let laplacian = laplacian(&model.triangles, points);
+        let mut entries = squared(&scaled(model, &laplacian, &areas, settings));
+        entries.extend(upper(&laplacian, MEMBRANE * MEMBRANE));
         let n = points.len();
         let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).map_err(|_| singular())?;
         let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Upper).map_err(|_| singular())?;
@@ -158,15 +162,10 @@ fn singular() -> FittingError {
     FittingError::Singular { what: "the conformation" }
 }
 
-/// Rows M^-½ ℓ² C of the bending energy: (column, value), ascending.
-fn scaled_laplacian(
-    model: &BodyModel,
-    points: &[Point3<f32>],
-    areas: &[f64],
-    settings: &ConformSettings,
-) -> Vec<Vec<(u32, f64)>> {
+/// Rows of the cotangent Laplacian C: (column, value), ascending.
+fn laplacian(triangles: &[[u32; 3]], points: &[Point3<f32>]) -> Vec<Vec<(u32, f64)>> {
     let mut rows: Vec<std::collections::BTreeMap<u32, f64>> = vec![Default::default(); points.len()];
-    for t in &model.triangles {
+    for t in triangles {
         for k in 0..3 {
             let (i, j, o) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
             let (a, b) = (points[i as usize] - points[o as usize], points[j as usize] - points[o as usize]);
@@ -178,15 +177,31 @@ fn scaled_laplacian(
             }
         }
     }
-    rows.into_iter()
-        .enumerate()
-        .map(|(v, row)| {
-            let stiff = model.inner[v] || model.regions[v].is_extremity();
-            let length = if stiff { settings.extremity_length } else { settings.stiffness_length };
-            let scale = length * length / areas[v].sqrt();
-            row.into_iter().map(|(c, w)| (c, w * scale)).collect()
-        })
-        .collect()
+    rows.into_iter().map(|row| row.into_iter().collect()).collect()
+}
+
+/// Rows M^-½ ℓ² C of the bending energy.
+fn scaled(
+    model: &BodyModel,
+    laplacian: &[Vec<(u32, f64)>],
+    areas: &[f64],
+    settings: &ConformSettings,
+) -> Vec<Vec<(u32, f64)>> {
+    let length = |v: usize| match model.regions[v] {
+        _ if model.inner[v] => settings.extremity_length,
+        Region::Head => settings.head_length,
+        r if r.is_extremity() => settings.extremity_length,
+        _ => settings.stiffness_length,
+    };
+    let scale = |v: usize| length(v).powi(2) / areas[v].sqrt();
+    laplacian.iter().enumerate().map(|(v, row)| row.iter().map(|&(c, w)| (c, w * scale(v))).collect()).collect()
+}
+
+/// Upper triangle of a symmetric matrix times `factor`.
+fn upper(rows: &[Vec<(u32, f64)>], factor: f64) -> impl Iterator<Item = Triplet<usize, usize, f64>> + '_ {
+    rows.iter().enumerate().flat_map(move |(i, row)| {
+        row.iter().filter(move |e| e.0 as usize >= i).map(move |&(j, w)| Triplet::new(i, j as usize, w * factor))
+    })
 }
 
 /// Upper triangle of RᵀR.

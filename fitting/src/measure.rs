@@ -36,15 +36,19 @@ pub struct Measurements {
     pub volume_m3: f64,
 }
 
-/// Measures a closed body at rest in the A-pose, +Y up; `inner` vertices (mouth, eye sockets) do not count for height.
-pub fn measure(body: &Mesh, inner: &[bool]) -> Measurements {
-    let outer = || body.positions.iter().enumerate().filter(|(v, _)| !inner.get(*v).copied().unwrap_or(false));
-    let low = outer().map(|(_, p)| f64::from(p.y)).fold(f64::INFINITY, f64::min);
-    let high = outer().map(|(_, p)| f64::from(p.y)).fold(f64::NEG_INFINITY, f64::max);
-    if low >= high {
+/// Height from the soles to the crown of a body standing straight, +Y up, metres; `inner` vertices (mouth, eye sockets)
+/// do not count.
+pub fn stature(body: &Mesh, inner: &[bool]) -> f64 {
+    let (low, high) = height_range(body, inner);
+    (high - low).max(0.0)
+}
+
+/// Girths of a closed body that stands on +Y with its arms clear of the trunk, at heights by its `stature` (metres).
+pub fn measure(body: &Mesh, inner: &[bool], stature: f64) -> Measurements {
+    let (low, high) = height_range(body, inner);
+    if low >= high || stature <= 0.0 {
         return Measurements::default();
     }
-    let stature = high - low;
     let largest = |a: &Girth, b: &Girth| a.girth_m.total_cmp(&b.girth_m);
     let least = |a: &Girth, b: &Girth| b.girth_m.total_cmp(&a.girth_m);
     Measurements {
@@ -54,6 +58,13 @@ pub fn measure(body: &Mesh, inner: &[bool]) -> Measurements {
         hip: extreme(body, low, stature, (0.47, 0.55), largest),
         volume_m3: body.signed_volume(),
     }
+}
+
+/// Lowest and highest outer point; nothing when there is none.
+fn height_range(body: &Mesh, inner: &[bool]) -> (f64, f64) {
+    let outer = body.positions.iter().enumerate().filter(|(v, _)| !inner.get(*v).copied().unwrap_or(false));
+    let nothing = (f64::INFINITY, f64::NEG_INFINITY);
+    outer.map(|(_, p)| f64::from(p.y)).fold(nothing, |(low, high), y| (low.min(y), high.max(y)))
 }
 
 fn extreme(
@@ -197,7 +208,7 @@ mod tests {
         let shift = mesh.positions.len() as u32;
         mesh.positions.extend(arm.positions);
         mesh.triangles.extend(arm.triangles.iter().map(|t| t.map(|v| v + shift)));
-        let m = measure(&mesh, &[]);
+        let m = measure(&mesh, &[], stature(&mesh, &[]));
         let truth = ellipse_perimeter(0.18, 0.12);
         for girth in [m.chest, m.waist, m.hip] {
             assert!((girth.girth_m - truth).abs() < 5e-4, "{} against {truth}", girth.girth_m);
@@ -218,7 +229,7 @@ mod tests {
 
     #[test]
     fn nothing_measures_nothing() {
-        assert_eq!(measure(&Mesh::default(), &[]), Measurements::default());
+        assert_eq!(measure(&Mesh::default(), &[], 1.8), Measurements::default());
         assert_eq!(girth_at(&column(0.0, 0.1, 0.1, 1.0), 2.0), 0.0);
     }
 }

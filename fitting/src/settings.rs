@@ -47,15 +47,24 @@ pub struct ConformSettings {
     /// Length over which the bending energy smooths the displacement, metres: detail much finer than six times
     /// this is left out. Default 0.006.
     pub stiffness_length: f64,
-    /// The same for hands, feet and face, which must stay well-formed, metres. Default 0.015.
+    /// The same for hands and feet, which must stay well-formed, metres. Default 0.015.
     pub extremity_length: f64,
+    /// The same for the head, metres. Default 0.008.
+    pub head_length: f64,
     /// Smallest cosine between the normals of body and scan. Default 0.6.
     pub min_cos: f64,
 }
 
 impl Default for ConformSettings {
     fn default() -> Self {
-        Self { rounds: 3, reach: 0.025, stiffness_length: 0.006, extremity_length: 0.015, min_cos: 0.6 }
+        Self {
+            rounds: 3,
+            reach: 0.025,
+            stiffness_length: 0.006,
+            extremity_length: 0.015,
+            head_length: 0.008,
+            min_cos: 0.6,
+        }
     }
 }
 
@@ -67,11 +76,15 @@ pub struct UnderSettings {
     pub headings: usize,
     /// Standard deviation of a joint's turn away from the initial pose, radians. Default 0.05 (2.9°).
     pub joint_sigma: f64,
-    /// Distance beyond which the scan is taken for new cloth over the mesh, metres. Default 0.004.
+    /// Distance at which a match counts a quarter: beyond it the scan is taken for new cloth over the mesh, metres.
+    /// Default 0.004.
     pub cloth: f64,
-    /// Standard deviation of the one-sided inside term, metres. Default 0.001.
+    /// How far new cloth typically stands off, metres: covered limbs are drawn to the middle of their sleeves with
+    /// this standard deviation. Default 0.012.
+    pub stand_off: f64,
+    /// Standard deviation of the one-sided inside term, metres. Default 0.002.
     pub inside_sigma: f64,
-    /// Difference of colour (0–255, root mean square of the channels) at which a match counts half. Default 30;
+    /// Difference of colour (0–255, root mean square of the channels) at which a match counts a quarter. Default 25;
     /// colours are left out where either mesh has none.
     pub color: f32,
     /// Most Gauss–Newton steps of the finest level. Default 20.
@@ -80,6 +93,14 @@ pub struct UnderSettings {
 
 impl Default for UnderSettings {
     fn default() -> Self {
-        Self { headings: 12, joint_sigma: 0.05, cloth: 0.004, inside_sigma: 0.001, color: 30.0, fine_iterations: 20 }
+        Self {
+            headings: 12,
+            joint_sigma: 0.05,
+            cloth: 0.004,
+            stand_off: 0.012,
+            inside_sigma: 0.002,
+            color: 25.0,
+            fine_iterations: 20,
+        }
     }
 }

@@ -104,13 +104,18 @@ fn check(dressed: &SkinnedMesh, trust: &[f32], scan: &Mesh, settings: &UnderSett
     if scan.is_empty() {
         return Err(FittingError::Scan("it has no triangles; scan the take again".into()));
     }
-    let positive = [settings.joint_sigma, settings.cloth, settings.inside_sigma];
+    let positive = [settings.joint_sigma, settings.cloth, settings.stand_off, settings.inside_sigma];
     if positive.iter().any(|s| !(*s > 0.0)) {
-        let reason = "joint_sigma, cloth and inside_sigma must be above 0".into();
+        let reason = "joint_sigma, cloth, stand_off and inside_sigma must be above 0".into();
         return Err(FittingError::Setting { name: "joint_sigma", reason });
     }
     Ok(())
 }
+
+/// How many independent measurements all cloth together stands for: its stand-off is alike over whole limbs.
+const INDEPENDENT_CLOTH: f64 = 50.0;
+/// Side of the patches that are covered or uncovered together, metres: about a limb's width.
+const PATCH: f32 = 0.12;
 
 /// Sampling and kernels of one resolution, metres.
 struct Scale {
@@ -164,8 +169,29 @@ struct Stage<'a> {
     /// Trust and colour of each thinned vertex.
     trust: Vec<f32>,
     colors: Vec<[f32; 3]>,
+    patches: Patches,
     scan: Cloud,
     settings: &'a UnderSettings,
+}
+
+/// Parts of the mesh that are covered or uncovered together: cells of a grid at rest, one limb's vertices each.
+struct Patches {
+    of_vertex: Vec<u32>,
+    count: usize,
+}
+
+impl Patches {
+    fn new(dressed: &SkinnedMesh, picked: &Thinned) -> Self {
+        let key = |v: &u32| {
+            let p = dressed.mesh.positions[*v as usize];
+            (dressed.weights.joints[*v as usize][0], [p.x, p.y, p.z].map(|c| (c / PATCH).floor() as i32))
+        };
+        let mut keys: Vec<_> = picked.vertices.iter().map(key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let of_vertex = picked.vertices.iter().map(|v| keys.binary_search(&key(v)).unwrap_or(0) as u32).collect();
+        Self { of_vertex, count: keys.len() }
+    }
 }
 
 struct StageEnd {
@@ -204,6 +230,7 @@ impl<'a> Stage<'a> {
             body: Articulated::of_skinned(source.dressed, &picked),
             trust: picked.vertices.iter().map(|&v| source.trust[v as usize]).collect(),
             colors: picked.vertices.iter().filter_map(of).collect(),
+            patches: Patches::new(source.dressed, &picked),
             scan: Cloud::new(samples).ok_or_else(empty)?,
             settings,
         })
@@ -233,20 +260,19 @@ impl<'a> Stage<'a> {
         Ok(StageEnd { state, iterations: done, converged })
     }
 
-    /// What pulls each vertex: the scan itself where it is uncovered, the scan's inner side where it is not.
+    /// What pulls each vertex: the scan itself where it is uncovered; where it is covered, the scan's inner side
+    /// strongly and the middle of the sleeve a little.
     fn residuals(&self, posed: &Posed, inside: bool) -> Vec<Residual> {
         let relations = self.relations(posed);
         let total: f64 = self.body.areas.iter().map(|&a| f64::from(a)).sum::<f64>().max(1e-12);
         let match_scale = INDEPENDENT / (total * f64::from(self.scale.noise).powi(2));
-        let inside_scale = INDEPENDENT / (total * self.settings.inside_sigma.powi(2));
+        let inside_scale = INDEPENDENT / (total * self.settings.inside_sigma.max(f64::from(self.scale.noise)).powi(2));
+        let center_scale = INDEPENDENT_CLOTH / (total * self.settings.stand_off.powi(2));
         let mut out = Vec::with_capacity(relations.len());
-        for relation in relations.into_iter().flatten() {
-            let Relation { mut residual, uncovered } = relation;
-            let area = residual.weight;
-            residual.weight = area * uncovered * match_scale;
-            if inside && residual.value > 0.0 {
-                residual.weight += area * (1.0 - uncovered) * inside_scale.min(match_scale * 4.0);
-            }
+        for Relation { mut residual, uncovered } in relations.into_iter().flatten() {
+            let (area, covered) = (residual.weight, 1.0 - uncovered);
+            let cloth = if residual.value > 0.0 { inside_scale } else { center_scale };
+            residual.weight = area * (uncovered * match_scale + if inside { covered * cloth } else { 0.0 });
             if residual.weight > 0.0 {
                 out.push(residual);
             }
@@ -255,7 +281,27 @@ impl<'a> Stage<'a> {
     }
 
     fn relations(&self, posed: &Posed) -> Vec<Option<Relation>> {
-        (0..self.body.len()).into_par_iter().with_min_len(128).map(|v| self.relation(posed, v)).collect()
+        let mut all: Vec<Option<Relation>> =
+            (0..self.body.len()).into_par_iter().with_min_len(128).map(|v| self.relation(posed, v)).collect();
+        self.agree_with_surroundings(&mut all);
+        all
+    }
+
+    /// Cloth covers patches, not points: where most of a patch is covered, a vertex that happens to lie near the cloth
+    /// (the knee at the front of the trousers) is covered too.
+    fn agree_with_surroundings(&self, all: &mut [Option<Relation>]) {
+        let mut sums = vec![(0.0, 0.0); self.patches.count];
+        for (v, relation) in all.iter().enumerate() {
+            let sum = &mut sums[self.patches.of_vertex[v] as usize];
+            let area = f64::from(self.body.areas[v]);
+            *sum = (sum.0 + area, sum.1 + relation.map_or(0.0, |r| area * r.uncovered));
+        }
+        for (v, relation) in all.iter_mut().enumerate() {
+            let (area, open) = sums[self.patches.of_vertex[v] as usize];
+            if let Some(r) = relation {
+                r.uncovered *= (1.5 * open / f64::max(area, 1e-12)).min(1.0).powi(2);
+            }
+        }
     }
 
     fn relation(&self, posed: &Posed, v: usize) -> Option<Relation> {
@@ -288,7 +334,7 @@ impl<'a> Stage<'a> {
         let squared = (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>() / 3.0;
         let half = f64::from(self.settings.color.max(1.0)).powi(2);
         // never nothing: light and shadow change colours too
-        0.1 + 0.9 * half / (half + f64::from(squared))
+        0.02 + 0.98 * (half / (half + f64::from(squared))).powi(2)
     }
 
     /// Share of the area that does not agree with the scan, 0–1.
