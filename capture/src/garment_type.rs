@@ -46,7 +46,7 @@ impl GarmentType {
         let name = name.to_ascii_lowercase();
         let parts: Vec<&str> = name.split(|c: char| !c.is_ascii_alphabetic()).collect();
         let known = |word: &&str| name == *word || parts.contains(word);
-        WORDS.iter().find(|(_, words)| words.iter().any(|word| known(word))).map(|(kind, _)| *kind)
+        WORDS.iter().find(|(_, words)| words.iter().any(&known)).map(|(kind, _)| *kind)
     }
 }
 

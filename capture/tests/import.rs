@@ -1,4 +1,5 @@
 //! Import: good folders, real ones where they are here, and each kind of bad one.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 
@@ -148,6 +149,9 @@ fn real_folders_are_guessed_and_read() {
         assert_eq!(source.frame_count(), Some(case.frames), "{}", case.path);
         let sensor = source.rig().sensors[0].clone();
         assert_eq!(sensor.color.is_some(), case.color);
+        if case.format == Format::SevenScenes {
+            assert_eq!(sensor.fps, 15.0, "every second frame of a 30 Hz sensor");
+        }
         let frame = source.next_frame().unwrap().unwrap();
         let depth = frame.depth.unwrap();
         assert_eq!((depth.width, depth.height), case.size);

@@ -1,4 +1,5 @@
 //! Recordings: round trip, determinism, torn and foreign files.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! Subjects on disk and their inspection.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

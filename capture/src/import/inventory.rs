@@ -111,7 +111,7 @@ impl FolderSource {
     /// A source over `entries`, whose numbers must rise.
     pub(super) fn new(
         path: &Path,
-        rig: Rig,
+        mut rig: Rig,
         entries: Vec<Entry>,
         missing_value: Option<u16>,
     ) -> Result<Self, CaptureError> {
@@ -119,7 +119,9 @@ impl FolderSource {
             return Err(CaptureError::format(path, "there is no depth image in this folder"));
         }
         let stride = entries.windows(2).fold(0, |all, pair| gcd(all, pair[1].number.saturating_sub(pair[0].number)));
-        Ok(Self { rig, entries, stride: stride.max(1), missing_value, next: 0 })
+        let stride = stride.max(1);
+        rig.sensors.iter_mut().for_each(|sensor| sensor.fps /= stride as f64);
+        Ok(Self { rig, entries, stride, missing_value, next: 0 })
     }
 
     pub(super) fn entries(&self) -> &[Entry] {

@@ -1,5 +1,5 @@
 //! Small synthetic frames and private data for the tests.
-#![allow(dead_code, missing_docs)]
+#![allow(dead_code, missing_docs, clippy::unwrap_used)]
 
 use std::{
     path::{Path, PathBuf},
