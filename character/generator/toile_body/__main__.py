@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from . import asset, balance, measure, model, mpfb, population, rig, sliders, surface
 
 HELD_OUT = 200
+FEWEST = 200  # people to learn from: the ANSUR stratum must span the components
 HERE = os.path.dirname(os.path.abspath(__file__))
 
 
@@ -24,6 +25,8 @@ def main():
     ap.add_argument("--seed", type=int, default=2017)
     ap.add_argument("--keep", help="also write samples and settings to this .pkl, for look.py")
     a = ap.parse_args()
+    if a.samples < HELD_OUT + FEWEST:
+        ap.error(f"--samples must be at least {HELD_OUT + FEWEST}: {HELD_OUT} are held out, and {model.COMPONENTS} components need people")
     start = time.time()
     log = lambda *x: print(f"[{time.time() - start:6.1f} s]", *x, flush=True)
 
