@@ -24,15 +24,11 @@ pub(crate) struct Gate {
     pub noise: f32,
 }
 
-/// Residuals of both directions and how well the surfaces cover each other.
+/// Residuals of both directions and how well the surfaces agree.
 pub(crate) struct Matches {
     pub residuals: Vec<Residual>,
     /// Robust cost 0–1, averaged over the areas of both surfaces; what has no match counts 1.
     pub misfit: f64,
-    /// Part of the body's area with a match.
-    pub body_covered: f64,
-    /// Part of the scan's trusted area with a match.
-    pub scan_covered: f64,
 }
 
 /// How many independent measurements the data of a level stand for, however many points sample it.
@@ -54,10 +50,10 @@ pub(crate) fn matches(body: &Articulated, posed: &Posed, scan: &Cloud, reverse: 
     let backward = backward(posed, reverse, gate);
     let body_area: Vec<f64> = body.areas.iter().map(|&a| f64::from(a)).collect();
     let scan_area: Vec<f64> = reverse.weights.iter().map(|&a| f64::from(a)).collect();
-    let (mut residuals, forward_misfit, body_covered) = weigh(forward, &body_area, gate);
-    let (more, backward_misfit, scan_covered) = weigh(backward, &scan_area, gate);
+    let (mut residuals, forward_misfit) = weigh(forward, &body_area, gate);
+    let (more, backward_misfit) = weigh(backward, &scan_area, gate);
     residuals.extend(more);
-    Matches { residuals, misfit: 0.5 * (forward_misfit + backward_misfit), body_covered, scan_covered }
+    Matches { residuals, misfit: 0.5 * (forward_misfit + backward_misfit) }
 }
 
 fn backward(posed: &Posed, reverse: &Samples, gate: &Gate) -> Vec<Option<Residual>> {
@@ -90,11 +86,11 @@ impl Gate {
     }
 }
 
-/// Turns areas into weights of the normal equations; returns them with the misfit and the covered part.
-fn weigh(pairs: Vec<Option<Residual>>, areas: &[f64], gate: &Gate) -> (Vec<Residual>, f64, f64) {
+/// Turns areas into weights of the normal equations; returns them with the misfit.
+fn weigh(pairs: Vec<Option<Residual>>, areas: &[f64], gate: &Gate) -> (Vec<Residual>, f64) {
     let total: f64 = areas.iter().sum::<f64>().max(1e-12);
     let scale = 0.5 * INDEPENDENT / (total * f64::from(gate.noise).powi(2));
-    let (mut cost, mut covered) = (0.0, 0.0);
+    let mut cost = 0.0;
     let mut out = Vec::with_capacity(pairs.len());
     for (pair, &area) in pairs.into_iter().zip(areas) {
         let Some(mut r) = pair else {
@@ -103,11 +99,10 @@ fn weigh(pairs: Vec<Option<Residual>>, areas: &[f64], gate: &Gate) -> (Vec<Resid
         };
         let squared = f64::from(r.value).powi(2);
         cost += area * squared / (squared + f64::from(gate.kernel).powi(2));
-        covered += area;
         r.weight *= scale * gate.robust(r.value);
         if r.weight > 0.0 {
             out.push(r);
         }
     }
-    (out, cost / total, covered / total)
+    (out, cost / total)
 }

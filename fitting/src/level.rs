@@ -32,7 +32,6 @@ pub(crate) struct Level<'a> {
 pub(crate) struct LevelResult {
     pub state: State,
     pub matches: Matches,
-    pub posed: Posed,
     pub iterations: usize,
     pub converged: bool,
 }
@@ -51,7 +50,7 @@ impl Level<'_> {
         }
         let posed = self.body.pose(&state);
         let matches = matches(self.body, &posed, self.scan, self.reverse, &self.gate);
-        Ok(LevelResult { state, matches, posed, iterations: done, converged })
+        Ok(LevelResult { state, matches, iterations: done, converged })
     }
 
     fn step(

@@ -9,7 +9,7 @@ use crate::FittingError;
 /// Longest side that a scan of (part of) a person may have, metres.
 const PERSON: std::ops::Range<f64> = 0.25..2.6;
 /// A side of at least this part of the longest one may be the person's height (arms can span as much).
-const UPRIGHT: f64 = 0.85;
+const UPRIGHT: f64 = 0.7;
 
 /// How the scan was brought to metres and +Y up: `fitted_from_input(p) = rotation * (scale * p)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

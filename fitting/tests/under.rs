@@ -1,0 +1,109 @@
+//! Posing a mesh under a scan that shows more clothes.
+
+mod common;
+
+use common::{joint_distance, mean_distance, person};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use toile_character::{BodyModel, Joint, Pose, Region};
+use toile_fitting::{FittingError, UnderSettings, Verdict, pose_under};
+use toile_geometry::{Mesh, bvh::Bvh};
+
+/// The same person in the next take: stepped, turned, every joint a little different.
+fn restepped(model: &BodyModel, pose: &Pose, beta: &[f64], heading: f64) -> Pose {
+    let mut numbers = common::Numbers(99);
+    let mut next = pose.clone();
+    for joint in toile_character::joint::JOINTS.into_iter().filter(|j| *j != Joint::Hips && !j.is_finger()) {
+        let turn = Vector3::new(numbers.next(), numbers.next(), numbers.next()) * f64::to_radians(1.5);
+        let rotation = next.rotation_mut(joint);
+        *rotation = UnitQuaternion::from_scaled_axis(turn) * *rotation;
+    }
+    let step = Isometry3::new(Vector3::new(0.012, 0.0, -0.01), Vector3::y() * heading.to_radians());
+    next.moved(&step, &model.skeleton_at(beta))
+}
+
+/// The body in `pose` with legs and trunk covered by cloth that stands off, more behind than before.
+fn dressed(model: &BodyModel, beta: &[f64], pose: &Pose, stand_off: f32) -> Mesh {
+    let mut mesh = Mesh::new(model.posed(beta, pose), model.triangles.clone());
+    mesh.recompute_normals();
+    let front = pose.rotation(Joint::Hips).cast::<f32>() * Vector3::z();
+    for v in 0..mesh.positions.len() {
+        if matches!(model.regions[v], Region::LeftLeg | Region::RightLeg | Region::Torso) {
+            let n = mesh.normals[v];
+            mesh.positions[v] += n * stand_off * (1.0 - 0.6 * n.dot(&front));
+        }
+    }
+    mesh.recompute_normals();
+    mesh
+}
+
+#[test]
+fn the_body_is_found_under_cloth_at_any_heading_and_stays_inside() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 11, 20.0);
+    let body = model.skinned(&truth.beta);
+    for heading in [2.0, 160.0] {
+        let next = restepped(&model, &truth.pose, &truth.beta, heading);
+        let scan = dressed(&model, &truth.beta, &next, 0.012);
+        let fit = pose_under(&body, &[], &truth.pose, &scan, &UnderSettings::default(), &|_| {}).unwrap();
+        let posed = body.posed(&fit.pose);
+        let error = mean_distance(&posed, &body.posed(&next));
+        assert!(error < 0.006, "heading {heading}: {error} m off, {:?}", fit.report);
+        assert_eq!(fit.report.verdict, Verdict::Trusted, "{:?}", fit.report);
+        assert!(((fit.report.heading_deg - heading).abs()) < 4.0, "{:?}", fit.report);
+        let bvh = Bvh::new(&scan.positions, &scan.triangles);
+        let outside =
+            posed.iter().filter(|p| !bvh.contains(p) && bvh.closest(p, 1.0).unwrap().distance > 0.003).count();
+        assert!(outside * 50 < posed.len(), "{outside} of {} vertices are outside", posed.len());
+    }
+}
+
+#[test]
+fn the_same_clothes_again_give_the_same_pose_again() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 12, 0.0);
+    let body = model.skinned(&truth.beta);
+    let next = restepped(&model, &truth.pose, &truth.beta, -3.0);
+    let scan = dressed(&model, &truth.beta, &next, 0.0);
+    let fit = pose_under(&body, &[], &truth.pose, &scan, &UnderSettings::default(), &|_| {}).unwrap();
+    let skeleton = model.skeleton_at(&truth.beta);
+    let joints = joint_distance(&fit.pose.joint_positions(&skeleton), &next.joint_positions(&skeleton));
+    assert!(joints < 0.003, "{joints} {:?}", fit.report);
+    assert!(fit.report.uncovered > 0.7, "{:?}", fit.report);
+    assert_eq!(fit.uncovered.len(), body.mesh.positions.len());
+}
+
+#[test]
+fn a_smaller_person_is_no_match() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 13, 0.0);
+    let body = model.skinned(&truth.beta);
+    let scan = dressed(&model, &truth.beta, &truth.pose, -0.03);
+    let fit = pose_under(&body, &[], &truth.pose, &scan, &UnderSettings::default(), &|_| {}).unwrap();
+    assert_ne!(fit.report.verdict, Verdict::Trusted, "{:?}", fit.report);
+}
+
+#[test]
+fn one_and_two_threads_give_the_same_bits() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 14, 0.0);
+    let body = model.skinned(&truth.beta);
+    let next = restepped(&model, &truth.pose, &truth.beta, 40.0);
+    let scan = dressed(&model, &truth.beta, &next, 0.01);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let settings = UnderSettings::default();
+        pool.install(|| pose_under(&body, &[], &truth.pose, &scan, &settings, &|_| {})).unwrap().pose
+    };
+    assert_eq!(run(1), run(2));
+}
+
+#[test]
+fn nonsense_is_refused_with_a_sentence() {
+    let model = BodyModel::load_default().unwrap();
+    let body = model.skinned(&[]);
+    let run = |trust: &[f32], scan: &Mesh| -> Result<_, FittingError> {
+        pose_under(&body, trust, &Pose::identity(), scan, &UnderSettings::default(), &|_| {})
+    };
+    assert!(run(&[], &Mesh::default()).unwrap_err().to_string().contains("no triangles"));
+    assert!(run(&[1.0], &body.mesh).unwrap_err().to_string().contains("trust"));
+}
