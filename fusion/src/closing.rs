@@ -20,9 +20,9 @@ const POINTS: usize = 1500;
 const PROBES: usize = 150;
 /// Least share of probes that a partner must see.
 const LEAST_OVERLAP: f64 = 0.4;
-/// Index distances of pairs along the way; farther pairs are seams.
+/// Index distances of pairs along the way.
 const STRIDES: [usize; 7] = [1, 2, 3, 5, 8, 13, 21];
-/// Of the pairs across the seam one in so many is used.
+/// Of farther pairs (across the seam, or back at a place seen before) one in so many is used.
 const SEAM_THINNING: usize = 3;
 /// Distance gate of the first and of the last round, metres.
 const GATES: (f64, f64) = (0.04, 0.012);
@@ -32,7 +32,7 @@ const GATES: (f64, f64) = (0.04, 0.012);
 pub struct Closing {
     /// Frame pairs used.
     pub pairs: usize,
-    /// Those of them across the seam (far apart in time).
+    /// Those of them more than half the take apart: across the seam.
     pub seam_pairs: usize,
     /// Median offset of the seam pairs at the subject's centre before, metres.
     pub seam_before: f64,
@@ -53,7 +53,8 @@ pub fn close(views: &[View], poses: &mut [Rigid], rounds: usize) -> Closing {
     let nodes: Vec<Node> = views.par_iter().map(|view| Node { view, points: samples(view, POINTS) }).collect();
     let center = subject_center(&nodes, poses);
     let pairs = overlapping_pairs(&nodes, poses);
-    let seam = |p: &(usize, usize)| p.1 - p.0 > STRIDES[STRIDES.len() - 1];
+    let half = poses.len() / 2;
+    let seam = |p: &(usize, usize)| p.1 - p.0 > half;
     let mut closing =
         Closing { pairs: pairs.len(), seam_pairs: pairs.iter().filter(|p| seam(p)).count(), ..Closing::default() };
     if poses.len() < 2 || pairs.is_empty() {

@@ -33,8 +33,10 @@ pub enum FusionError {
         reason: String,
     },
     /// Tracking found no frames that agree.
-    #[error("only {tracked} of {frames} frames could be tracked; nothing to make a scan of")]
+    #[error("only {tracked} of {frames} frames could be tracked ({reason}); nothing to make a scan of")]
     NotTracked {
+        /// Why the first of the others was dropped.
+        reason: String,
         /// Frames with a trusted pose.
         tracked: usize,
         /// Frames seen.

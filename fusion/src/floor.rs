@@ -18,8 +18,15 @@ const BAND: f64 = 0.012;
 const LEAST_SHARE: f64 = 0.15;
 /// Least upward background pixels (every second row and column) to look for a floor at all.
 const LEAST_PIXELS: usize = 150;
+/// Least spread (standard deviation) of a floor's pixels along its narrower direction, metres.
+const LEAST_SPREAD: f64 = 0.12;
 /// A disk rises at most this far over the floor, metres.
 const HIGHEST_DISK: f64 = 0.6;
+
+/// The disk is looked for within this distance of where the subject stands, metres.
+const DISK_REACH: f64 = 0.7;
+/// Least pixels of a level.
+const LEAST_LEVEL: usize = 40;
 
 /// The plane the subject stands on, camera frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +56,7 @@ pub fn find_floor(camera: &PinholeCamera, background: &[f32], subject: &[Point3<
     let (normal, point, share) = best_plane(&pixels)?;
     let height = |p: &Point3<f64>| (p - point).dot(&normal);
     let below = subject.iter().filter(|p| height(&p.cast()) < -0.05).count();
-    if share < LEAST_SHARE || below * 10 > subject.len() {
+    if share < LEAST_SHARE || below * 10 > subject.len() || spread(&pixels, &normal, &point) < LEAST_SPREAD {
         return None;
     }
     Some(disk_on(&pixels, subject, normal, point))
@@ -57,7 +64,7 @@ pub fn find_floor(camera: &PinholeCamera, background: &[f32], subject: &[Point3<
 
 fn upward_pixels(camera: &PinholeCamera, background: &[f32]) -> Vec<Upward> {
     let (w, h) = (camera.width as usize, camera.height as usize);
-    let normals = normals_from_depth(camera, background);
+    let normals = normals_from_depth(camera, background, 3);
     let mut pixels = Vec::new();
     for y in (0..h).step_by(2) {
         for x in (0..w).step_by(2) {
@@ -97,6 +104,17 @@ fn members<'a>(pixels: &'a [Upward], normal: &Vector3<f64>, point: &Point3<f64>,
     pixels.iter().step_by(step).filter(belongs).collect()
 }
 
+/// Standard deviation of a plane's members along its narrower direction.
+fn spread(pixels: &[Upward], normal: &Vector3<f64>, point: &Point3<f64>) -> f64 {
+    let group = members(pixels, normal, point, 1);
+    let mean = group.iter().map(|u| u.point.coords).sum::<Vector3<f64>>() / group.len().max(1) as f64;
+    let scatter: Matrix3<f64> =
+        group.iter().map(|u| (u.point.coords - mean) * (u.point.coords - mean).transpose()).sum();
+    let mut values: Vec<f64> = SymmetricEigen::new(scatter).eigenvalues.iter().copied().collect();
+    values.sort_unstable_by(f64::total_cmp);
+    (values[1].max(0.0) / group.len().max(1) as f64).sqrt()
+}
+
 /// Least-squares plane, normal towards −Y of the camera (up); `None` of fewer than ten points.
 fn fit_plane(points: &[Point3<f64>]) -> Option<(Vector3<f64>, Point3<f64>)> {
     if points.len() < 10 {
@@ -112,38 +130,46 @@ fn fit_plane(points: &[Point3<f64>]) -> Option<(Vector3<f64>, Point3<f64>)> {
 
 /// The highest well-filled level parallel to the floor within the subject's reach: the disk, or the floor itself.
 fn disk_on(pixels: &[Upward], subject: &[Point3<f32>], normal: Vector3<f64>, point: Point3<f64>) -> Floor {
-    let bin = 0.01;
-    let bins = (HIGHEST_DISK / bin) as usize;
-    let center = subject.iter().map(|p| p.coords.cast::<f64>()).sum::<Vector3<f64>>() / subject.len().max(1) as f64;
+    let center = footing(subject, &normal, &point);
     let across = |v: Vector3<f64>| (v - normal * v.dot(&normal)).norm();
-    let mut histogram = vec![0usize; bins];
-    let mut total = 0;
-    for u in pixels.iter().filter(|u| u.normal.dot(&normal) > ALIGNED && across(u.point.coords - center) < 0.9) {
-        let h = (u.point - point).dot(&normal) + 2.0 * BAND;
-        if h >= 0.0 && ((h / bin) as usize) < bins {
-            histogram[(h / bin) as usize] += 1;
-            total += 1;
-        }
-    }
-    let level = (0..bins.saturating_sub(1))
-        .filter(|&k| (histogram[k] + histogram[k + 1]) * 6 > total && total > 30)
-        .max()
-        .map_or(0.0, |k| (k as f64 + 1.0) * bin - 2.0 * BAND);
-    let start = if level > 2.0 * BAND { point + normal * level } else { point };
-    let near: Vec<Point3<f64>> = pixels
+    let near: Vec<&Upward> = pixels
         .iter()
-        .filter(|u| (u.point - start).dot(&normal).abs() < BAND && u.normal.dot(&normal) > ALIGNED)
-        .filter(|u| level <= 2.0 * BAND || across(u.point.coords - center) < 0.9)
-        .map(|u| u.point)
+        .filter(|u| u.normal.dot(&normal) > ALIGNED && across(u.point - center) < DISK_REACH)
         .collect();
-    let (n, on) = fit_plane(&near).unwrap_or((normal, start));
-    let mut offsets: Vec<f64> = near.iter().map(|p| (p - on).dot(&n).abs()).collect();
+    let heights: Vec<f64> = near.iter().map(|u| (u.point - point).dot(&normal)).collect();
+    let (mut n, mut on) = (normal, point + normal * highest_level(&heights));
+    let mut offsets = Vec::new();
+    for band in [BAND, 0.5 * BAND, 0.5 * BAND] {
+        let members: Vec<Point3<f64>> =
+            near.iter().map(|u| u.point).filter(|p| (p - on).dot(&n).abs() < band).collect();
+        (n, on) = fit_plane(&members).unwrap_or((n, on));
+        offsets = members.iter().map(|p| (p - on).dot(&n).abs()).collect();
+    }
     offsets.sort_unstable_by(f64::total_cmp);
     let sigma = 1.4826 * offsets.get(offsets.len() / 2).copied().unwrap_or(0.003);
-    Floor {
-        normal: n,
-        point: on,
-        margin: (5.0 * sigma).clamp(0.005, 0.02),
-        disk_height: if level > 2.0 * BAND { (on - point).dot(&normal) } else { 0.0 },
+    let rise = (on - point).dot(&normal) - (on - center).dot(&normal) + (on - center).dot(&n);
+    Floor { normal: n, point: on, margin: (5.0 * sigma).clamp(0.005, 0.02), disk_height: rise.max(0.0) }
+}
+
+/// Where the subject stands: the mean of its low points, or of all where none is low.
+fn footing(subject: &[Point3<f32>], normal: &Vector3<f64>, point: &Point3<f64>) -> Point3<f64> {
+    let all: Vec<Point3<f64>> = subject.iter().map(|p| p.cast()).collect();
+    let low: Vec<Point3<f64>> = all.iter().copied().filter(|p| (p - point).dot(normal) < 0.4).collect();
+    let chosen = if low.len() > 50 { &low } else { &all };
+    Point3::from(chosen.iter().map(|p| p.coords).sum::<Vector3<f64>>() / chosen.len().max(1) as f64)
+}
+
+/// The highest height at which a level holds a fair share of the given ones.
+fn highest_level(heights: &[f64]) -> f64 {
+    let bin = 0.004;
+    let mut histogram = vec![0usize; ((HIGHEST_DISK + BAND) / bin) as usize];
+    for h in heights.iter().map(|h| (h + BAND) / bin).filter(|h| *h >= 0.0) {
+        if let Some(count) = histogram.get_mut(h as usize) {
+            *count += 1;
+        }
     }
+    let total: usize = histogram.iter().sum();
+    let filled = |w: &[usize]| w.iter().sum::<usize>() > LEAST_LEVEL.max(total / 12);
+    let level = histogram.windows(3).rposition(filled);
+    level.map_or(0.0, |k| (k as f64 + 1.5) * bin - BAND)
 }

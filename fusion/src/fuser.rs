@@ -14,11 +14,13 @@ use crate::{
     depth_filter::drop_edges,
     integrate::integrate,
     motion::{Axis, MotionModel, find_axis, total_turn},
+    noise::depth_noise,
+    normals::window_for,
     report::{DroppedFrame, FusionReport, Stopwatch, VolumeReport},
     surface::extract_surface,
     track::{Tracked, register, samples, track},
     tsdf::Tsdf,
-    view::{CutDepth, View, decode_color, rectified_depth},
+    view::{CutDepth, View, decode_color, is_measured, rectified_depth},
     volume::{SURVEY_FRAMES, SubjectVolume, find_volume},
 };
 
@@ -30,6 +32,8 @@ const TRUST: (f64, f64, f64) = (0.4, 0.5, 0.4);
 const DEPARTURE: (f64, f64) = (0.06, 0.12);
 /// First guesses of the turn between the first two frames, degrees.
 const FIRST_TURNS: [f64; 11] = [0.0, 1.5, -1.5, 3.5, -3.5, 6.0, -6.0, 9.0, -9.0, 13.0, -13.0];
+/// The band is at least this many standard deviations of the noise.
+const NOISE_BAND: f64 = 4.5;
 /// A turn of this many degrees is a full one.
 const FULL_TURN_DEG: f64 = 340.0;
 /// Most frames in the joint optimisation; of more, evenly spaced ones.
@@ -70,6 +74,8 @@ pub struct Fuser {
     sensor: Sensor,
     volume: Option<SubjectVolume>,
     model: Tsdf,
+    noise: f64,
+    window: usize,
     motion: MotionModel,
     kept: Vec<Kept>,
     dropped: Vec<DroppedFrame>,
@@ -188,6 +194,8 @@ impl Fuser {
         }
         Ok(Self {
             model: Tsdf::new(settings.voxel_size, settings.truncation, false),
+            noise: 0.0,
+            window: 2,
             motion: MotionModel::new(settings.prior),
             settings,
             sensor,
@@ -210,10 +218,11 @@ impl Fuser {
             Ok(depth) => depth,
             Err(reason) => return Ok(self.drop_frame(frame, reason)),
         };
-        let view = {
-            let cut = &prepared;
-            self.clock.time("normals", || cut.view())
-        };
+        if self.kept.is_empty() {
+            self.adapt(&prepared);
+        }
+        let window = self.window;
+        let view = self.clock.time("normals", || prepared.view(window));
         let found = match self.locate(frame, &view) {
             Ok(found) => found,
             Err(reason) => return Ok(self.drop_frame(frame, reason)),
@@ -232,6 +241,21 @@ impl Fuser {
             tracked,
         });
         Ok(Outcome::Fused { scan_from_camera, tracked })
+    }
+
+    /// Takes the depth noise from the first frame: noisy depth needs wider normals and a wider band.
+    fn adapt(&mut self, first: &CutDepth) {
+        let depth = first.meters();
+        self.noise = depth_noise(&first.camera, &depth).unwrap_or(0.0);
+        let (sum, count) =
+            depth.iter().filter(|d| is_measured(**d)).fold((0.0, 0), |(s, n), d| (s + f64::from(*d), n + 1));
+        self.window = window_for(&first.camera, self.noise, sum / f64::from(count.max(1)));
+        self.model = self.empty_field(false);
+    }
+
+    fn empty_field(&self, with_color: bool) -> Tsdf {
+        let truncation = self.settings.truncation.max(NOISE_BAND * self.noise).min(3.0 * self.settings.truncation);
+        Tsdf::new(self.settings.voxel_size, truncation, with_color)
     }
 
     fn drop_frame(&mut self, frame: &Frame, reason: String) -> Outcome {
@@ -307,7 +331,7 @@ impl Fuser {
 
     fn trusted(&self, tracked: &Tracked, predicted: &Rigid) -> Result<(), String> {
         let (overlap, inliers, residual) = TRUST;
-        let limit = residual * self.settings.truncation;
+        let limit = residual * f64::from(self.model.truncation());
         if tracked.overlap < overlap {
             return Err(format!("lost: {:.0} % of its points lie on the model", tracked.overlap * 100.0));
         }
@@ -339,7 +363,8 @@ impl Fuser {
     pub fn finish(mut self, progress: &(dyn Fn(f32) + Sync)) -> Result<Scan, FusionError> {
         let least = if self.seen < 3 { 1 } else { 3 };
         if self.kept.len() < least {
-            return Err(FusionError::NotTracked { tracked: self.kept.len(), frames: self.seen });
+            let reason = self.dropped.first().map_or_else(|| "too few frames".into(), |d| d.reason.clone());
+            return Err(FusionError::NotTracked { reason, tracked: self.kept.len(), frames: self.seen });
         }
         let mut report = FusionReport { settings: self.settings.clone(), ..FusionReport::default() };
         report.settings.poses = None;
@@ -368,7 +393,7 @@ impl Fuser {
     }
 
     fn views(&self, indices: &[usize]) -> Vec<View> {
-        indices.par_iter().map(|&i| self.kept[i].depth.view()).collect()
+        indices.par_iter().map(|&i| self.kept[i].depth.view(self.window)).collect()
     }
 
     /// Joint optimisation over key frames; frames between follow their neighbours.
@@ -398,11 +423,11 @@ impl Fuser {
     /// Fuses all frames and registers each of them to the whole.
     fn refine(&mut self) -> Result<(), FusionError> {
         let field = self.fuse_again(false)?;
-        let kept = &self.kept;
+        let (kept, window) = (&self.kept, self.window);
         let poses: Vec<Rigid> = self.clock.time("refine", || {
             kept.par_iter()
                 .map(|k| {
-                    let view = k.depth.view();
+                    let view = k.depth.view(window);
                     let tracked = register(&field, &samples(&view, 6000), &k.scan_from_camera);
                     if tracked.overlap > 0.5 { tracked.scan_from_camera } else { k.scan_from_camera }
                 })
@@ -415,11 +440,12 @@ impl Fuser {
 
     fn fuse_again(&mut self, with_color: bool) -> Result<Tsdf, FusionError> {
         let with_color = with_color && self.kept.iter().any(|k| k.color.is_some());
-        let mut field = Tsdf::new(self.settings.voxel_size, self.settings.truncation, with_color);
+        let mut field = self.empty_field(with_color);
+        let window = self.window;
         let (kept, sensor) = (&self.kept, &self.sensor);
         self.clock.time("fuse again", || {
             for group in kept.chunks(16) {
-                let views: Vec<View> = group.par_iter().map(|k| colored_view(k, sensor, with_color)).collect();
+                let views: Vec<View> = group.par_iter().map(|k| colored_view(k, sensor, window, with_color)).collect();
                 for (k, view) in group.iter().zip(&views) {
                     integrate(&mut field, view, &k.scan_from_camera)?;
                 }
@@ -471,6 +497,8 @@ impl Fuser {
             bottom_m: v.bottom.unwrap_or(0.0),
             axis_distance_m: v.scan_from_camera.translation.vector.xz().norm(),
         });
+        report.noise_mm = self.noise * 1e3;
+        report.truncation_mm = f64::from(field.truncation()) * 1e3;
         let mut residuals: Vec<f64> = self.kept.iter().filter_map(|k| k.tracked.map(|t| t.residual * 1e3)).collect();
         residuals.sort_unstable_by(f64::total_cmp);
         report.residual_mm = residuals.get(residuals.len() / 2).copied().unwrap_or(0.0);
@@ -510,8 +538,8 @@ fn warnings(report: &FusionReport) -> Vec<String> {
     list
 }
 
-fn colored_view(kept: &Kept, sensor: &Sensor, with_color: bool) -> View {
-    let mut view = kept.depth.view();
+fn colored_view(kept: &Kept, sensor: &Sensor, window: usize, with_color: bool) -> View {
+    let mut view = kept.depth.view(window);
     if let Some(image) = decode_color(kept.color.as_ref(), kept.index).filter(|_| with_color) {
         let image: Arc<_> = image;
         view.add_colors(&image, sensor);

@@ -6,7 +6,7 @@ use toile_geometry::Rigid;
 use crate::{
     FusionError,
     normals::dot,
-    tsdf::{Block, ColorBlock, SIDE, Tsdf, Voxel, WEIGHT_ONE, floor},
+    tsdf::{Block, ColorBlock, SIDE, Tsdf, VOXELS, WEIGHT_ONE, floor},
     view::{View, is_measured},
 };
 
@@ -139,12 +139,12 @@ fn touch_blocks(tsdf: &mut Tsdf, view: &View, scan_from_camera: &Rigid) -> Resul
     Ok(touched)
 }
 
-/// Pixels that may be skipped so that neighbouring rays still fall at most a third of a block apart.
+/// Pixels that may be skipped so that neighbouring rays still fall at most half a block apart.
 fn sampling_stride(view: &View, block_size: f32) -> usize {
-    let nearest_third =
+    let total =
         view.depth.iter().filter(|d| is_measured(**d)).fold((0.0f64, 0usize), |(s, n), d| (s + f64::from(*d), n + 1));
-    let mean = nearest_third.0 / nearest_third.1.max(1) as f64;
-    ((f64::from(block_size) / 3.0 * view.camera.fx / mean.max(0.1)) as usize).clamp(1, 4)
+    let mean = total.0 / total.1.max(1) as f64;
+    ((f64::from(block_size) / 2.0 * view.camera.fx / mean.max(0.1)) as usize).clamp(1, 4)
 }
 
 impl<'a> Projection<'a> {
@@ -183,17 +183,14 @@ impl<'a> Projection<'a> {
             if !any {
                 continue;
             }
-            for x in 0..SIDE {
-                let depth = self.depth[index[x] as usize];
-                if depth == 0.0 || range[x] - depth > self.truncation {
-                    continue;
-                }
-                let pixel = &self.pixels[index[x] as usize];
-                let p: [f32; 3] = std::array::from_fn(|r| start[r] + self.axes[0][r] * x as f32);
-                let Some(distance) = self.distance(pixel, p) else { continue };
-                blend(&mut block[row * SIDE + x], distance / self.unit, pixel.weight);
-                if let Some(colors) = color.as_deref_mut().filter(|_| distance.abs() < COLOR_BAND * self.truncation) {
-                    blend_color(&mut colors[row * SIDE + x], self.colors[index[x] as usize], pixel.weight);
+            let (distance, weight) = self.measure(start, &index, &range);
+            let sdf: &mut [i16; SIDE] = row_of(&mut block.sdf, row);
+            blend(sdf, row_of(&mut block.weight, row), &distance, &weight);
+            if let Some(colors) = color.as_deref_mut() {
+                for x in 0..SIDE {
+                    if weight[x] > 0.0 && distance[x].abs() < COLOR_BAND * f32::from(i16::MAX) {
+                        blend_color(&mut colors[row * SIDE + x], self.colors[index[x] as usize], weight[x]);
+                    }
                 }
             }
         }
@@ -228,25 +225,57 @@ impl<'a> Projection<'a> {
         (index, range, any)
     }
 
-    /// Signed distance of a camera-frame point to a surface element, capped in front; `None` behind the band.
+    /// Signed distances (voxel units, capped in front) to the surface elements of a row's pixels, and their weights:
+    /// 0 behind the band or where nothing was measured.
     #[inline]
-    fn distance(&self, pixel: &Pixel, p: [f32; 3]) -> Option<f32> {
-        let t = self.truncation;
-        if p[2] - pixel.depth < -4.0 * t {
-            return Some(t);
+    fn measure(&self, start: [f32; 3], index: &[u32; SIDE], range: &[f32; SIDE]) -> ([f32; SIDE], [f32; SIDE]) {
+        let mut planes = [[0.0f32; SIDE]; 6];
+        for x in 0..SIDE {
+            let pixel = &self.pixels[(index[x] as usize).min(self.pixels.len() - 1)];
+            let plane = [pixel.normal[0], pixel.normal[1], pixel.normal[2], pixel.offset, pixel.weight, pixel.depth];
+            (0..6).for_each(|k| planes[k][x] = plane[k]);
         }
-        let distance = dot(pixel.normal, p) - pixel.offset;
-        (distance > -t).then(|| distance.min(t))
+        let (t, step, scale) = (self.truncation, self.axes[0], 1.0 / self.unit);
+        let outside = (self.depth.len() - 1) as u32;
+        let (mut distance, mut weight) = ([0.0; SIDE], [0.0; SIDE]);
+        for x in 0..SIDE {
+            let k = x as f32;
+            let p = [start[0] + step[0] * k, start[1] + step[1] * k, start[2] + step[2] * k];
+            let to_plane = planes[0][x] * p[0] + planes[1][x] * p[1] + planes[2][x] * p[2] - planes[3][x];
+            let ahead = planes[5][x] - range[x];
+            let d = if ahead > 4.0 * t { t } else { to_plane };
+            let counts = index[x] != outside && ahead >= -t && d > -t;
+            distance[x] = d.min(t) * scale;
+            weight[x] = if counts { planes[4][x] } else { 0.0 };
+        }
+        (distance, weight)
     }
 }
 
 #[inline]
-fn blend(voxel: &mut Voxel, sdf: f32, weight: f32) {
-    let old = f32::from(voxel.weight);
-    let sum = old + weight;
-    let value = (f32::from(voxel.sdf) * old + sdf * weight) / sum;
-    voxel.sdf = floor(value + 0.5) as i16;
-    voxel.weight = (sum + 0.5).min(f32::from(u16::MAX)) as u16;
+fn row_of<T>(values: &mut [T; VOXELS], row: usize) -> &mut [T; SIDE] {
+    let (rows, _) = values.as_chunks_mut::<SIDE>();
+    &mut rows[row]
+}
+
+/// Adding 1.5 · 2²³ puts a float's rounded value into its low bits: conversion without a branch.
+const ROUNDER: f32 = 12_582_912.0;
+
+#[inline]
+fn rounded(x: f32) -> i32 {
+    ((x + ROUNDER).to_bits() as i32).wrapping_sub(ROUNDER.to_bits() as i32)
+}
+
+/// Running weighted means of a row.
+#[inline]
+fn blend(sdf: &mut [i16; SIDE], weights: &mut [u16; SIDE], distance: &[f32; SIDE], weight: &[f32; SIDE]) {
+    for x in 0..SIDE {
+        let old = f32::from(weights[x]);
+        let sum = old + weight[x];
+        let value = (f32::from(sdf[x]) * old + distance[x] * weight[x]) / sum.max(1e-6);
+        sdf[x] = rounded(value) as i16;
+        weights[x] = rounded(sum.min(65535.0)) as u16;
+    }
 }
 
 #[inline]

@@ -20,6 +20,7 @@ pub mod floor;
 pub mod fuser;
 pub mod integrate;
 pub mod motion;
+pub mod noise;
 pub mod normals;
 pub mod raycast;
 pub mod report;
@@ -30,6 +31,11 @@ pub mod track;
 pub mod tsdf;
 pub mod view;
 pub mod volume;
+
+#[cfg(test)]
+mod test_scene;
+#[cfg(test)]
+mod tests;
 
 pub use error::FusionError;
 pub use fuser::{Fuser, Outcome, fuse};

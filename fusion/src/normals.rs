@@ -4,8 +4,6 @@ use toile_geometry::camera::PinholeCamera;
 
 use crate::view::{is_measured, unproject};
 
-/// Half width of the smoothing window that precedes the differences, pixels.
-const WINDOW: usize = 2;
 /// Neighbours farther than this many pixel widths in depth do not smooth each other.
 const SMOOTH_SLOPE: f32 = 4.0;
 /// A normal closer than this to the viewing ray's plane is not trusted (cosine).
@@ -14,10 +12,11 @@ const MIN_COSINE: f32 = 0.05;
 const JUMP_SLOPE: f32 = 16.0;
 
 /// Unit normals towards the camera from central (at borders one-sided) differences of range-gated, averaged depth; zero
-/// where a direction has no neighbour or the surface is seen edge-on. O(pixels).
-pub fn normals_from_depth(camera: &PinholeCamera, depth: &[f32]) -> Vec<[f32; 3]> {
+/// where a direction has no neighbour or the surface is seen edge-on. `window` is the averaging's half width, pixels.
+/// O(pixels · window).
+pub fn normals_from_depth(camera: &PinholeCamera, depth: &[f32], window: usize) -> Vec<[f32; 3]> {
     let (w, h) = (camera.width as usize, camera.height as usize);
-    let smooth = smoothed(camera, depth);
+    let smooth = smoothed(camera, depth, window);
     let point = |x: usize, y: usize| unproject(camera, x as f32, y as f32, smooth[y * w + x]);
     let mut normals = vec![[0.0; 3]; depth.len()];
     for y in 0..h {
@@ -51,21 +50,20 @@ fn facing(n: [f32; 3], p: [f32; 3]) -> [f32; 3] {
     if cosine < MIN_COSINE { [0.0; 3] } else { n.map(|c| c / length) }
 }
 
-/// Separable range-gated mean over (2 WINDOW + 1)² pixels.
-fn smoothed(camera: &PinholeCamera, depth: &[f32]) -> Vec<f32> {
+/// Separable range-gated mean over (2 window + 1)² pixels.
+fn smoothed(camera: &PinholeCamera, depth: &[f32], window: usize) -> Vec<f32> {
     let (w, h) = (camera.width as usize, camera.height as usize);
     let slope = SMOOTH_SLOPE / camera.fx as f32;
     let mut rows = vec![0.0; depth.len()];
     for y in 0..h {
         for x in 0..w {
-            let (a, b) = (x.saturating_sub(WINDOW), (x + WINDOW).min(w - 1));
-            let inner = (x - a).min(b - x);
+            let inner = x.min(w - 1 - x).min(window);
             rows[y * w + x] = gated_mean(depth, y * w + x, inner, 1, slope);
         }
     }
     let mut out = vec![0.0; depth.len()];
     for y in 0..h {
-        let inner = y.min(h - 1 - y).min(WINDOW);
+        let inner = y.min(h - 1 - y).min(window);
         for x in 0..w {
             out[y * w + x] = gated_mean(&rows, y * w + x, inner, w, slope);
         }
@@ -91,6 +89,13 @@ fn gated_mean(depth: &[f32], i: usize, reach: usize, step: usize, slope: f32) ->
         }
     }
     sum / count
+}
+
+/// The averaging window (half width, pixels) at which the differences of depth with noise `sigma` (metres) at
+/// `depth` metres still make normals: the noisier against the pixel's width, the wider.
+pub fn window_for(camera: &PinholeCamera, sigma: f64, depth: f64) -> usize {
+    let pitch = depth / camera.fx;
+    (1.0 + 4.0 * sigma / pitch.max(1e-6)).round().clamp(2.0, 8.0) as usize
 }
 
 /// Difference of two vectors.
@@ -125,7 +130,7 @@ mod tests {
                 (n.z * 2.0) / dot(r, [n.x, n.y, n.z])
             })
             .collect();
-        let normals = normals_from_depth(&camera, &depth);
+        let normals = normals_from_depth(&camera, &depth, 2);
         for y in 3..27 {
             for x in 3..37 {
                 let m = normals[y * 40 + x];

@@ -53,6 +53,10 @@ pub struct FusionReport {
     pub axis_tilt_deg: Option<f64>,
     /// Volume, where the subject was cut out.
     pub volume: Option<VolumeReport>,
+    /// Standard deviation of the depth noise, measured on the subject, millimetres.
+    pub noise_mm: f64,
+    /// Truncation used: as set, or more where the noise asks for it, millimetres.
+    pub truncation_mm: f64,
     /// Root mean square tracking residual, median over frames, millimetres.
     pub residual_mm: f64,
     /// The largest residual of a frame, millimetres.

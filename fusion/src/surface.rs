@@ -76,7 +76,7 @@ fn drop_unused(mesh: Mesh) -> Mesh {
 fn piece(tsdf: &Tsdf, slot: usize, min_weight: u16) -> Piece {
     let mut piece = Piece::default();
     let block = &tsdf.blocks[slot];
-    if !block.iter().any(|v| v.weight > 0 && v.sdf <= 0) && !borders_inside(tsdf, slot) {
+    if !block.has_inside() && !borders_inside(tsdf, slot) {
         return piece;
     }
     let (values, weights) = padded(tsdf, slot);
@@ -105,7 +105,7 @@ fn borders_inside(tsdf: &Tsdf, slot: usize) -> bool {
     let c = tsdf.coords[slot];
     (1..8).any(|code| {
         let next = tsdf.slot([c[0] + (code & 1), c[1] + (code >> 1 & 1), c[2] + (code >> 2)]);
-        next != NONE && tsdf.blocks[next as usize].iter().any(|v| v.weight > 0 && v.sdf <= 0)
+        next != NONE && tsdf.blocks[next as usize].has_inside()
     })
 }
 
@@ -120,7 +120,7 @@ fn padded(tsdf: &Tsdf, slot: usize) -> (Vec<f32>, Vec<u16>) {
                 let code = usize::from(x == SIDE) | usize::from(y == SIDE) << 1 | usize::from(z == SIDE) << 2;
                 let voxel = match around[code] {
                     NONE => crate::tsdf::Voxel::default(),
-                    s => tsdf.blocks[s as usize][local_index([x as i32, y as i32, z as i32])],
+                    s => tsdf.blocks[s as usize].voxel(local_index([x as i32, y as i32, z as i32])),
                 };
                 values.push(f32::from(voxel.sdf));
                 weights.push(voxel.weight);

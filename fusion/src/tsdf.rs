@@ -27,8 +27,27 @@ pub struct Voxel {
 /// Mean colour of one voxel: 8.8 fixed point channels and the sum of weights.
 pub type ColorVoxel = [u16; 4];
 
-/// A block: 512 voxels, x fastest.
-pub(crate) type Block = [Voxel; VOXELS];
+/// A block: 512 voxels, x fastest, distances and weights apart so that rows of eight are updated together.
+#[derive(Debug, Clone)]
+pub(crate) struct Block {
+    pub sdf: [i16; VOXELS],
+    pub weight: [u16; VOXELS],
+}
+
+impl Block {
+    const EMPTY: Self = Self { sdf: [0; VOXELS], weight: [0; VOXELS] };
+
+    /// One voxel.
+    #[inline]
+    pub(crate) fn voxel(&self, k: usize) -> Voxel {
+        Voxel { sdf: self.sdf[k], weight: self.weight[k] }
+    }
+
+    /// True where a seen voxel lies inside.
+    pub(crate) fn has_inside(&self) -> bool {
+        self.sdf.iter().zip(&self.weight).any(|(s, w)| *w > 0 && *s <= 0)
+    }
+}
 /// The colours of a block.
 pub(crate) type ColorBlock = [ColorVoxel; VOXELS];
 
@@ -113,7 +132,7 @@ impl Tsdf {
         if self.index.slots[cell] == NONE {
             self.index.slots[cell] = self.blocks.len() as u32;
             self.coords.push(b);
-            self.blocks.push([Voxel::default(); VOXELS]);
+            self.blocks.push(Block::EMPTY);
             if self.with_color {
                 self.colors.push([[0; 4]; VOXELS]);
             }
@@ -126,7 +145,7 @@ impl Tsdf {
     pub fn voxel(&self, v: [i32; 3]) -> Voxel {
         match self.slot(v.map(|c| c >> 3)) {
             NONE => Voxel::default(),
-            slot => self.blocks[slot as usize][local_index(v)],
+            slot => self.blocks[slot as usize].voxel(local_index(v)),
         }
     }
 
@@ -187,11 +206,11 @@ impl Tsdf {
             let block = &self.blocks[slot as usize];
             let at = local_index(v);
             for (k, c) in corners.iter_mut().enumerate() {
-                let voxel = block[at + (k & 1) + ((k >> 1) & 1) * 8 + (k >> 2) * 64];
-                if voxel.weight == 0 {
+                let j = at + (k & 1) + ((k >> 1) & 1) * 8 + (k >> 2) * 64;
+                if block.weight[j] == 0 {
                     return None;
                 }
-                *c = f32::from(voxel.sdf);
+                *c = f32::from(block.sdf[j]);
             }
             return Some((corners, f));
         }

@@ -72,10 +72,10 @@ impl CutDepth {
         self.values.iter().map(|&v| if v == FREE_UNITS { FREE } else { f32::from(v) * self.scale }).collect()
     }
 
-    /// Depth with normals, without colour.
-    pub fn view(&self) -> View {
+    /// Depth with normals (averaged over `window` pixels to each side), without colour.
+    pub fn view(&self, window: usize) -> View {
         let depth = self.meters();
-        let normals = crate::normals::normals_from_depth(&self.camera, &depth);
+        let normals = crate::normals::normals_from_depth(&self.camera, &depth, window);
         View { camera: self.camera, depth, normals, colors: Vec::new() }
     }
 }

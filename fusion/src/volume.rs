@@ -17,10 +17,14 @@ use crate::{
 pub const SURVEY_FRAMES: usize = 40;
 /// A pixel moves where it is this much nearer than its background: metres, and share of the depth.
 const MOVING: (f32, f32) = (0.06, 0.03);
+/// Share of the frames that must agree on a pixel's background for it to rest.
+const RESTING: f32 = 0.4;
+/// A pixel measured in at most this share of the frames sees nothing but what passes.
+const PASSING: f32 = 0.25;
 /// Edge of the cells that moving points are clustered in, metres.
 const CELL: f32 = 0.10;
 /// Least moving pixels a frame, as a share of the image, that count as somebody.
-const LEAST_MOVING: f32 = 0.002;
+const LEAST_MOVING: f32 = 0.001;
 /// Room left around what moved, metres.
 const MARGIN: f64 = 0.06;
 
@@ -43,9 +47,9 @@ pub struct SubjectVolume {
 /// # Errors
 /// [`FusionError::NobodyInIt`] where nothing of a person's size moves.
 pub fn find_volume(camera: &PinholeCamera, depths: &[Vec<f32>]) -> Result<SubjectVolume, FusionError> {
-    let background = farthest_stable(depths);
+    let background = Background::new(depths);
     let moving = moving_points(camera, depths, &background);
-    let least = (LEAST_MOVING * background.len() as f32) as usize * depths.len();
+    let least = (LEAST_MOVING * background.far.len() as f32) as usize * depths.len();
     let nobody = |reason: String| FusionError::NobodyInIt { reason };
     if moving.len() * SAMPLE * SAMPLE < least {
         return Err(nobody(format!("only {} of the looked-at pixels ever move", moving.len() * SAMPLE * SAMPLE)));
@@ -54,7 +58,9 @@ pub fn find_volume(camera: &PinholeCamera, depths: &[Vec<f32>]) -> Result<Subjec
     if subject.len() * SAMPLE * SAMPLE < least {
         return Err(nobody("what moves is scattered, no single subject".into()));
     }
-    let floor = find_floor(camera, &background, &subject);
+    let resting: Vec<f32> =
+        background.far.iter().zip(&background.rests).map(|(&d, &rests)| if rests { d } else { 0.0 }).collect();
+    let floor = find_floor(camera, &resting, &subject);
     let up = floor.as_ref().map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal);
     Ok(cylinder(&subject, up, floor))
 }
@@ -62,29 +68,46 @@ pub fn find_volume(camera: &PinholeCamera, depths: &[Vec<f32>]) -> Result<Subjec
 /// Pixels of the survey are taken every so many rows and columns.
 const SAMPLE: usize = 2;
 
-/// The farthest depth of each pixel that a second frame confirms; 0 where there is none.
-fn farthest_stable(depths: &[Vec<f32>]) -> Vec<f32> {
-    let count = depths.first().map_or(0, Vec::len);
-    let mut values = Vec::with_capacity(depths.len());
-    (0..count)
-        .map(|i| {
+/// What rests behind the subject.
+struct Background {
+    /// The farthest depth of each pixel that a second frame confirms; 0 where there is none.
+    far: Vec<f32>,
+    /// True where many frames agree on that depth.
+    rests: Vec<bool>,
+    /// True where hardly any frame measures anything: what is seen there passes by.
+    open: Vec<bool>,
+}
+
+impl Background {
+    fn new(depths: &[Vec<f32>]) -> Self {
+        let count = depths.first().map_or(0, Vec::len);
+        let (mut far, mut rests, mut open) = (Vec::new(), Vec::new(), Vec::new());
+        let mut values = Vec::with_capacity(depths.len());
+        for i in 0..count {
             values.clear();
             values.extend(depths.iter().map(|d| d[i]).filter(|&d| is_measured(d)));
             values.sort_unstable_by(f32::total_cmp);
-            let confirmed = values.windows(2).rev().find(|w| w[1] - w[0] < 0.02 * w[1]);
-            confirmed.map_or(0.0, |w| w[0])
-        })
-        .collect()
+            let confirmed = values.windows(2).rev().find(|w| w[1] - w[0] < 0.02 * w[1]).map_or(0.0, |w| w[0]);
+            let near = confirmed - 0.015f32.max(0.012 * confirmed);
+            let agreeing = values.iter().filter(|&&d| d >= near).count();
+            far.push(confirmed);
+            rests.push(agreeing as f32 >= RESTING * depths.len() as f32);
+            open.push(values.len() as f32 <= PASSING * depths.len() as f32);
+        }
+        Self { far, rests, open }
+    }
 }
 
-fn moving_points(camera: &PinholeCamera, depths: &[Vec<f32>], background: &[f32]) -> Vec<Point3<f32>> {
+fn moving_points(camera: &PinholeCamera, depths: &[Vec<f32>], background: &Background) -> Vec<Point3<f32>> {
     let (w, h) = (camera.width as usize, camera.height as usize);
     let mut points = Vec::new();
     for depth in depths {
         for y in (0..h).step_by(SAMPLE) {
             for x in (0..w).step_by(SAMPLE) {
-                let (d, far) = (depth[y * w + x], background[y * w + x]);
-                if is_measured(d) && d < far - MOVING.0.max(MOVING.1 * far) {
+                let i = y * w + x;
+                let (d, far) = (depth[i], background.far[i]);
+                let passes = background.open[i] || d < far - MOVING.0.max(MOVING.1 * far);
+                if is_measured(d) && passes {
                     points.push(unproject(camera, x as f32, y as f32, d).into());
                 }
             }
@@ -138,7 +161,7 @@ fn cylinder(subject: &[Point3<f32>], up: Vector3<f64>, floor: Option<Floor>) -> 
     let rim = sorted(leveled.iter().filter(|p| (p.x - x).abs() > 0.85 * reach).map(|p| p.z));
     let z = percentile(&rim, 0.5);
     let radii = sorted(leveled.iter().map(|p| (p.x - x).hypot(p.z - z)));
-    let radius = percentile(&radii, 0.999) + MARGIN;
+    let radius = 1.05 * percentile(&radii, 0.999) + MARGIN;
     let heights = sorted(leveled.iter().map(|p| p.y));
     let ground = match &floor {
         Some(f) => floor_height(&leveled_from_camera, f, x, z),

@@ -1,0 +1,280 @@
+//! Tests of the whole stage on a scene with known truth.
+
+use nalgebra::Point3;
+use toile_geometry::{Rigid, ply, topology::Edges};
+
+use crate::{
+    FusionError, FusionSettings, KnownPose, Outcome, Scan,
+    closing::close,
+    depth_filter::drop_edges,
+    fuse,
+    integrate::integrate,
+    raycast::ray_cast,
+    surface::extract_surface,
+    test_scene::{Scene, figure_distance, steps},
+    track::{register, samples, track},
+    tsdf::Tsdf,
+    view::{CutDepth, View, rectified_depth},
+    volume::find_volume,
+};
+
+fn settings() -> FusionSettings {
+    FusionSettings { voxel_size: 0.008, truncation: 0.03, target_triangles: 20_000, ..FusionSettings::default() }
+}
+
+/// The figure alone.
+fn view(scene: &Scene, angle: f64, seed: u64) -> View {
+    let bare = Scene { with_floor: false, with_wall: false, ..scene.clone() };
+    let rig = bare.rig();
+    let (camera, depth) = rectified_depth(&bare.render(Some(angle), seed), &rig.sensors[0], 6.0);
+    CutDepth::new(&camera, &drop_edges(&camera, &depth, 8.3), 0.001).view(2)
+}
+
+fn difference(a: &Rigid, b: &Rigid) -> (f64, f64) {
+    let d = a.inverse() * b;
+    let body = Point3::new(0.0, 0.0, 2.3);
+    ((d * body - body).norm(), d.rotation.angle().to_degrees())
+}
+
+/// Mean distance of the scan's vertices to the true figure after the best rigid fit known from the first pose.
+fn mean_error(scan: &Scan, scene: &Scene) -> f64 {
+    let figure_from_scan = scene.figure_from_camera(0.0) * scan.trajectory[0].scan_from_camera.inverse();
+    let seen = scan.mesh.positions.iter().zip(&scan.mesh.attributes["filled"]).filter(|(_, f)| **f == 0.0);
+    let errors: Vec<f64> = seen.map(|(p, _)| figure_distance(&(figure_from_scan * p.cast::<f64>())).abs()).collect();
+    errors.iter().sum::<f64>() / errors.len() as f64
+}
+
+#[test]
+fn a_frame_tracked_against_its_own_model_stays() {
+    let scene = Scene::new();
+    let view = view(&scene, 0.3, 7);
+    let pose = scene.figure_from_camera(0.3);
+    let mut model = Tsdf::new(0.004, 0.016, false);
+    integrate(&mut model, &view, &pose).unwrap();
+    let tracked = track(&model, &view, &pose);
+    let (shift, angle) = difference(&pose, &tracked.scan_from_camera);
+    assert!(shift < 5e-5 && angle < 0.005, "{:.4} mm {angle:.5}°", shift * 1e3);
+    assert!(tracked.converged && tracked.overlap > 0.9 && tracked.conditioning > 1e-3, "{tracked:?}");
+}
+
+#[test]
+fn the_ray_cast_lies_on_the_measured_surface() {
+    let scene = Scene { noise: 0.0, ..Scene::new() };
+    let view = view(&scene, 0.3, 7);
+    let pose = scene.figure_from_camera(0.3);
+    let mut model = Tsdf::new(0.004, 0.016, false);
+    integrate(&mut model, &view, &pose).unwrap();
+    let seen = ray_cast(&model, &view.camera, &pose, 1);
+    let camera_from_figure = pose.inverse();
+    let mut offsets: Vec<f64> = view
+        .samples(1)
+        .filter_map(|i| {
+            let hit = seen.hits[i]?;
+            let p = camera_from_figure * Point3::from(hit.point).cast::<f64>();
+            Some(p.z - f64::from(view.depth[i]))
+        })
+        .collect();
+    let count = view.samples(1).count();
+    assert!(offsets.len() > count * 8 / 10, "{} of {count}", offsets.len());
+    offsets.sort_unstable_by(f64::total_cmp);
+    let median = offsets[offsets.len() / 2];
+    assert!(median.abs() < 1e-4, "median offset {:.3} mm", median * 1e3);
+}
+
+#[test]
+fn a_plane_and_a_sphere_come_out_where_they_are() {
+    let camera = toile_geometry::camera::PinholeCamera::ideal(160, 120, 200.0, 200.0, 79.5, 59.5);
+    let center = Point3::new(0.0, 0.0, 1.0);
+    let sphere = |ray: [f32; 3]| {
+        let d = nalgebra::Vector3::from(ray).cast::<f64>();
+        let (a, b, c) = (d.norm_squared(), d.dot(&center.coords), center.coords.norm_squared() - 0.04);
+        let root = b * b - a * c;
+        if root > 0.0 { ((b - root.sqrt()) / a) as f32 } else { 1.3 }
+    };
+    let depth: Vec<f32> = (0..160 * 120)
+        .map(|i| sphere(crate::view::unproject(&camera, (i % 160) as f32, (i / 160) as f32, 1.0)))
+        .collect();
+    let filtered = drop_edges(&camera, &depth, 8.3);
+    let normals = crate::normals::normals_from_depth(&camera, &filtered, 2);
+    let view = View { camera, depth: filtered, normals, colors: vec![] };
+    let mut tsdf = Tsdf::new(0.004, 0.016, false);
+    integrate(&mut tsdf, &view, &Rigid::identity()).unwrap();
+    let mesh = extract_surface(&tsdf, 1);
+    let (mut near_sphere, mut near_plane) = (0, 0);
+    for p in &mesh.positions {
+        let p = p.cast::<f64>();
+        let (s, w) = (((p - center).norm() - 0.2).abs(), (p.z - 1.3).abs());
+        assert!(s.min(w) < 2.5e-3, "{p} is {:.2} mm off", s.min(w) * 1e3);
+        if s < w { near_sphere += 1 } else { near_plane += 1 }
+    }
+    assert!(near_sphere > 2000 && near_plane > 2000, "{near_sphere} {near_plane}");
+}
+
+#[test]
+fn a_solid_sphere_is_extracted_closed_and_manifold() {
+    let mut tsdf = Tsdf::new(0.01, 0.04, false);
+    tsdf.cover([-5, -5, -5], [5, 5, 5]).unwrap();
+    for b in 0..11i32.pow(3) {
+        tsdf.slot_or_new([b % 11 - 5, b / 11 % 11 - 5, b / 121 - 5]);
+    }
+    for slot in 0..tsdf.block_count() {
+        let c = tsdf.coords[slot];
+        for k in 0..crate::tsdf::VOXELS as i32 {
+            let v = [c[0] * 8 + k % 8, c[1] * 8 + k / 8 % 8, c[2] * 8 + k / 64].map(|x| f64::from(x) * 0.01);
+            // Two spheres that just touch make ambiguous cells.
+            let d = ((v[0] - 0.151).hypot(v[1]).hypot(v[2]) - 0.15).min((v[0] + 0.152).hypot(v[1]).hypot(v[2]) - 0.15);
+            let sdf = (d / 0.04 * 32767.0).clamp(-32767.0, 32767.0) as i16;
+            tsdf.blocks[slot].sdf[k as usize] = sdf;
+            tsdf.blocks[slot].weight[k as usize] = 64;
+        }
+    }
+    let mesh = extract_surface(&tsdf, 1);
+    assert!(Edges::new(&mesh.triangles).is_closed());
+    mesh.validate().unwrap();
+    let volume = 2.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.15f64.powi(3);
+    assert!((mesh.signed_volume() - volume).abs() < 0.02 * volume, "{}", mesh.signed_volume());
+}
+
+#[test]
+fn joint_optimisation_recovers_disturbed_poses() {
+    let scene = Scene { noise: 0.001, ..Scene::new() };
+    let angles: Vec<f64> = (0..24).map(|i| f64::from(i) * 15.3f64.to_radians()).collect();
+    let views: Vec<View> = angles.iter().enumerate().map(|(i, &a)| view(&scene, a, i as u64)).collect();
+    let truth: Vec<Rigid> = angles.iter().map(|&a| scene.figure_from_camera(a)).collect();
+    let mut poses: Vec<Rigid> = truth
+        .iter()
+        .enumerate()
+        .map(|(i, t)| {
+            let k = i as f64;
+            let twist = nalgebra::Vector3::new(0.001 * k.sin(), 0.0012 * k, 0.001 * k.cos());
+            nalgebra::Isometry3::new(nalgebra::Vector3::new(4e-4 * k, 3e-4 * k, 0.003 * (3.0 * k).sin()), twist) * t
+        })
+        .collect();
+    poses[0] = truth[0];
+    let before: f64 = truth.iter().zip(&poses).map(|(t, p)| difference(t, p).0).sum::<f64>() / 24.0;
+    let closing = close(&views, &mut poses, 8);
+    let after: f64 = truth.iter().zip(&poses).map(|(t, p)| difference(t, p).0).sum::<f64>() / 24.0;
+    assert!(before > 0.006 && after < 0.0008, "{before} -> {after}, {closing:?}");
+    assert!(closing.seam_pairs > 0 && closing.seam_after < closing.seam_before);
+}
+
+#[test]
+fn a_full_turn_becomes_one_closed_figure_on_the_disk() {
+    let scene = Scene::new();
+    let scan = fuse(&mut scene.source(&steps(52, 7.1)), &settings(), &|_| {}).unwrap();
+    let report = &scan.report;
+    assert_eq!((report.frames_fused, report.dropped.len()), (52, 0), "{:?}", report.dropped);
+    assert!((report.turned_deg - 51.0 * 7.1).abs() < 0.5 && report.full_turn, "{}", report.turned_deg);
+    assert!(report.watertight && report.warnings.is_empty(), "{:?}", report.warnings);
+    let volume = report.volume.as_ref().unwrap();
+    assert!(volume.floor_found && (volume.disk_height_m - 0.06).abs() < 0.004, "{volume:?}");
+    let error = mean_error(&scan, &scene);
+    assert!(error < 0.0015, "{:.2} mm", error * 1e3);
+    let (lo, hi) = scan.mesh.bounds().unwrap();
+    assert!(lo.y.abs() < 0.004 && (hi.y - 1.705).abs() < 0.02, "{lo} {hi}");
+    assert!(lo.x > -0.62 && hi.x < 0.62, "disk or floor is left: {lo} {hi}");
+    let first = scan.trajectory[0].scan_from_camera.translation.vector;
+    assert!(first.x.abs() < 1e-6 && first.z > 2.2, "+Z looks at the first camera: {first}");
+}
+
+#[test]
+fn the_result_does_not_depend_on_threads() {
+    let scene = Scene::new();
+    let frames = scene.frames(&steps(14, 7.0));
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut source = crate::test_scene::Memory { rig: scene.rig(), frames: frames.clone(), next: 0 };
+        let scan = pool.install(|| fuse(&mut source, &settings(), &|_| {})).unwrap();
+        (ply::encode(&scan.mesh), scan.trajectory_tum(), serde_json::to_string(&scan.report).unwrap())
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(3));
+}
+
+#[test]
+fn a_part_of_a_turn_is_a_warning() {
+    let scene = Scene { with_floor: false, ..Scene::new() };
+    let scan = fuse(&mut scene.source(&steps(26, -8.0)), &settings(), &|_| {}).unwrap();
+    assert!((scan.report.turned_deg - 200.0).abs() < 1.5, "{}", scan.report.turned_deg);
+    assert!(scan.report.warnings.iter().any(|w| w.contains("no full turn: 200°")), "{:?}", scan.report.warnings);
+    assert!(mean_error(&scan, &scene) < 0.002, "{}", mean_error(&scan, &scene));
+}
+
+#[test]
+fn an_empty_room_is_nobody() {
+    let scene = Scene::new();
+    let error = fuse(&mut scene.source(&[None; 12]), &settings(), &|_| {}).unwrap_err();
+    assert!(matches!(error, FusionError::NobodyInIt { .. }), "{error}");
+    assert!(error.to_string().contains("nobody in it"));
+}
+
+#[test]
+fn a_foreign_frame_is_left_out_and_a_gap_is_crossed() {
+    let scene = Scene::new();
+    let mut angles = steps(40, 6.0);
+    angles[20] = Some(angles[20].unwrap() + 2.5); // somebody jumped
+    let mut source = scene.source(&angles);
+    source.frames.drain(25..27);
+    let scan = fuse(&mut source, &settings(), &|_| {}).unwrap();
+    assert_eq!(scan.report.dropped.iter().map(|d| d.index).collect::<Vec<_>>(), [20]);
+    assert!(mean_error(&scan, &scene) < 0.002);
+}
+
+#[test]
+fn known_poses_are_taken_as_they_are() {
+    let scene = Scene::new();
+    let angles = steps(12, 30.0);
+    let pose = |i: usize| scene.figure_from_camera(angles[i].unwrap());
+    let poses = (0..12).map(|i| KnownPose { device_time_ns: 200_000_000 * i as i64, scan_from_camera: pose(i) });
+    let settings = FusionSettings { poses: Some(poses.collect()), ..settings() };
+    let scan = fuse(&mut scene.source(&angles), &settings, &|_| {}).unwrap();
+    assert_eq!(scan.trajectory.len(), 12);
+    assert!((0..12).all(|i| difference(&pose(i), &scan.trajectory[i].scan_from_camera).0 < 1e-9));
+    assert!(mean_error(&scan, &scene) < 0.0015);
+}
+
+#[test]
+fn settings_out_of_range_and_missing_depth_are_refused() {
+    let scene = Scene::new();
+    let bad = FusionSettings { truncation: 0.004, ..settings() };
+    let error = fuse(&mut scene.source(&steps(12, 30.0)), &bad, &|_| {}).unwrap_err();
+    assert!(matches!(error, FusionError::Settings(_)), "{error}");
+    let mut source = scene.source(&steps(3, 8.0));
+    source.frames.iter_mut().for_each(|f| f.depth = None);
+    assert!(matches!(fuse(&mut source, &settings(), &|_| {}), Err(FusionError::NoDepth { frames: 3 })));
+}
+
+#[test]
+fn frames_pushed_one_by_one_report_their_pose() {
+    let scene = Scene::new();
+    let frames = scene.frames(&steps(8, 6.0));
+    let volume = crate::fuser::survey(&scene.rig(), &frames, &settings()).unwrap();
+    let mut fuser = crate::Fuser::new(&scene.rig(), Some(volume), settings()).unwrap();
+    for (i, frame) in frames.iter().enumerate() {
+        match fuser.push(frame).unwrap() {
+            Outcome::Fused { tracked, .. } => assert_eq!(tracked.is_some(), i > 0),
+            Outcome::Dropped { reason } => panic!("{reason}"),
+        }
+    }
+    assert_eq!(fuser.finish(&|_| {}).unwrap().trajectory.len(), 8);
+}
+
+#[test]
+fn the_volume_has_the_axis_the_floor_and_nothing_else() {
+    let scene = Scene::new();
+    let rig = scene.rig();
+    let depths: Vec<Vec<f32>> = steps(20, 18.0)
+        .iter()
+        .enumerate()
+        .map(|(i, a)| rectified_depth(&scene.render(*a, i as u64), &rig.sensors[0], 6.0))
+        .map(|(camera, depth)| drop_edges(&camera, &depth, 8.3))
+        .collect();
+    let volume = find_volume(&scene.camera, &depths).unwrap();
+    let (shift, angle) = difference(&scene.room_from_camera, &volume.scan_from_camera);
+    assert!(shift < 0.15, "{shift}");
+    assert!(angle < 2.0, "{angle}");
+    assert!(volume.radius > 0.55 && volume.radius < 0.8, "{}", volume.radius);
+    let registered =
+        register(&Tsdf::new(0.004, 0.016, false), &samples(&view(&scene, 0.0, 1), 500), &Rigid::identity());
+    assert!(!registered.converged && registered.overlap == 0.0, "nothing to register to is no success");
+}
