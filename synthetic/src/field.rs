@@ -29,7 +29,7 @@ impl Grid {
     }
 
     /// How many nodes there are.
-    pub fn len(&self) -> usize {
+    pub fn node_count(&self) -> usize {
         self.dims.iter().product()
     }
 
@@ -85,7 +85,7 @@ pub struct Field {
 impl Field {
     /// A value for each node by its position and index. Parallel, deterministic.
     pub fn from_fn(grid: &Grid, value: impl Fn(usize, &Point3<f32>) -> f32 + Sync) -> Self {
-        let values = (0..grid.len()).into_par_iter().map(|i| value(i, &grid.position(grid.node(i)))).collect();
+        let values = (0..grid.node_count()).into_par_iter().map(|i| value(i, &grid.position(grid.node(i)))).collect();
         Self { grid: grid.clone(), values }
     }
 
@@ -131,7 +131,7 @@ impl Field {
             }
             sum / (2 * radius + 1) as f32
         };
-        self.values = (0..grid.len()).into_par_iter().map(value).collect();
+        self.values = (0..grid.node_count()).into_par_iter().map(value).collect();
     }
 }
 
@@ -148,7 +148,7 @@ pub fn signed_distance(mesh: &Mesh, grid: &Grid) -> (Field, Vec<u32>) {
     let coarse_grid =
         Grid { origin: grid.origin, cell: grid.cell * COARSE as f32, dims: grid.dims.map(|n| n.div_ceil(COARSE) + 1) };
     let coarse = Field::from_fn(&coarse_grid, |_, p| exact(p, None).0);
-    let nodes: Vec<(f32, u32)> = (0..grid.len())
+    let nodes: Vec<(f32, u32)> = (0..grid.node_count())
         .into_par_iter()
         .map(|i| {
             let p = grid.position(grid.node(i));

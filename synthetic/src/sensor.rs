@@ -66,9 +66,9 @@ impl SensorPreset {
     /// Camera to axis so that a tall person fits, metres.
     pub fn usual_distance(self) -> f64 {
         match self {
-            Self::Kinect1 => 2.5,
+            Self::Kinect1 => 2.6,
             Self::Kinect2 => 2.2,
-            Self::Stereo => 2.7,
+            Self::Stereo => 2.8,
         }
     }
 }

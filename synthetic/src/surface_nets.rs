@@ -11,7 +11,7 @@ const NO_VERTEX: u32 = u32::MAX;
 /// then drawn onto the interpolated level.
 pub fn mesh(field: &Field, wanted: impl Fn(&Point3<f32>) -> bool) -> Mesh {
     let grid = &field.grid;
-    let mut vertex_of_cell = vec![NO_VERTEX; grid.len()];
+    let mut vertex_of_cell = vec![NO_VERTEX; grid.node_count()];
     let mut positions = Vec::new();
     let cells = grid.dims.map(|n| n.saturating_sub(1));
     for z in 0..cells[2] {
@@ -52,7 +52,7 @@ fn crossing_mean(field: &Field, cell: [usize; 3]) -> Option<Point3<f32>> {
 fn quads(field: &Field, vertex_of_cell: &[u32], positions: &[Point3<f32>]) -> Vec<[u32; 3]> {
     let grid = &field.grid;
     let mut triangles = Vec::new();
-    for i in 0..grid.len() {
+    for i in 0..grid.node_count() {
         let node = grid.node(i);
         for k in 0..3 {
             let (u, v) = ((k + 1) % 3, (k + 2) % 3);

@@ -196,7 +196,8 @@ impl Measure<'_> {
         let (nape, throat) = (self.landmark("cervicale"), self.landmark("suprasternale"));
         let forward = (throat - nape).try_normalize(1e-6).unwrap_or(Vector3::z()) * (0.6 * wide);
         let center = nalgebra::center(&nape, &throat) + forward;
-        Neckline { center, radius: 0.5 * (nape - throat).norm() + wide, highest: nape.y + 0.012 }
+        let highest = (nape.y + 0.03).min(self.landmark("chin").y - 0.025);
+        Neckline { center, radius: 0.5 * (nape - throat).norm() + wide, highest }
     }
 
     fn bottoms(&self, leg_share: f32, ease: f32, flare: f32) -> Tailoring {

@@ -95,7 +95,7 @@ mod tests {
     fn the_hull_of_a_star_is_its_outline() {
         let star = |i: usize| {
             let (sin, cos) = (std::f64::consts::TAU * i as f64 / 16.0).sin_cos();
-            let r = if i % 2 == 0 { 2.0 } else { 0.7 };
+            let r = if i.is_multiple_of(2) { 2.0 } else { 0.7 };
             Point2::new(r * cos, r * sin)
         };
         let hull = convex_hull(&mut (0..16).map(star).collect());

@@ -23,7 +23,7 @@ fn settings() -> SyntheticSettings {
     }
 }
 
-static SUBJECT: LazyLock<Subject> = LazyLock::new(|| Subject::new(&settings()).unwrap());
+static SUBJECT: LazyLock<Subject> = LazyLock::new(|| Subject::new(&settings()).expect("the settings are in range"));
 
 #[test]
 fn every_layer_is_outside_the_ones_below_in_every_take() {
@@ -115,7 +115,7 @@ fn the_same_bytes_for_any_number_of_threads_and_every_run() {
 }
 
 fn truth_bytes(settings: &SyntheticSettings) -> String {
-    truth::subject_json(&Subject::new(settings).unwrap()).to_string()
+    truth::subject_json(&Subject::new(settings).expect("the settings are in range")).to_string()
 }
 
 #[test]
