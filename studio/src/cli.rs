@@ -67,6 +67,8 @@ pub enum Command {
     Demo(commands::demo::Demo),
     /// Make a synthetic subject with its truth: for training, tests and trials of a rig
     Synthesize(commands::synthesize::Synthesize),
+    /// Tell which cameras are plugged in and what is wrong with them
+    Devices(commands::devices::Devices),
     /// Print completions for a shell
     Completions(commands::completions::Completions),
 }

@@ -52,6 +52,9 @@ pub enum StudioError {
         /// What was found.
         reason: String,
     },
+    /// A device or the permission to use it.
+    #[error("{0}")]
+    Device(String),
     /// Another run holds the subject.
     #[error("{path}: another toile works on this subject; wait for it to end")]
     Busy {
@@ -98,6 +101,7 @@ impl StudioError {
             Self::Format { .. } => "format",
             Self::Stage { .. } => "stage",
             Self::NothingNew { .. } => "nothing-new",
+            Self::Device(_) => "device",
             Self::Busy { .. } => "busy",
             Self::Capture(_) => "capture",
             Self::Geometry(_) => "geometry",

@@ -2,7 +2,7 @@
 
 use std::{
     ffi::OsString,
-    io::{self, Write},
+    io::{self, IsTerminal, Write},
     sync::Arc,
 };
 
@@ -51,6 +51,7 @@ impl Command {
             Self::Process(c) => c.run(session),
             Self::Demo(c) => c.run(session),
             Self::Synthesize(c) => c.run(session),
+            Self::Devices(c) => c.run(session),
             Self::Completions(c) => c.run(),
         }
     }
@@ -66,6 +67,7 @@ impl Command {
             Self::Process(_) => "process",
             Self::Demo(_) => "demo",
             Self::Synthesize(_) => "synthesize",
+            Self::Devices(_) => "devices",
             Self::Completions(_) => "completions",
         }
     }
@@ -107,6 +109,7 @@ fn start_log(session: &Session) {
         .with_env_filter(filter)
         .with_writer(BesideTheBar(session.progress.clone()))
         .with_target(false)
+        .with_ansi(io::stderr().is_terminal())
         .without_time();
     // A second run in the same process (tests) keeps the first one's log.
     drop(log.try_init());

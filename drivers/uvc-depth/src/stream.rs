@@ -14,6 +14,32 @@ use crate::{UvcDepthError, decode::Layout};
 /// Buffers that the kernel may fill ahead of us.
 const BUFFERS: u32 = 4;
 
+/// A V4L2 node that offers depth.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DepthNode {
+    /// Device node, such as `/dev/video2`.
+    pub node: PathBuf,
+    /// What the driver calls the camera.
+    pub name: String,
+}
+
+/// The nodes that offer Z16 or Y16, in the order of their names; nodes that cannot be opened are left out.
+pub fn list() -> Vec<DepthNode> {
+    let Ok(entries) = std::fs::read_dir("/dev") else { return Vec::new() };
+    let is_video = |p: &Path| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with("video"));
+    let mut nodes: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| is_video(p)).collect();
+    nodes.sort();
+    nodes.into_iter().filter_map(depth_node).collect()
+}
+
+fn depth_node(node: PathBuf) -> Option<DepthNode> {
+    let device = Device::with_path(&node).ok()?;
+    let offered: Vec<FourCC> = device.enum_formats().ok()?.iter().map(|f| f.fourcc).collect();
+    depth_format(&offered)?;
+    let name = device.query_caps().map(|c| c.card).unwrap_or_default();
+    Some(DepthNode { node, name })
+}
+
 /// A filled buffer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Buffer {

@@ -2,6 +2,7 @@
 
 pub mod completions;
 pub mod demo;
+pub mod devices;
 pub mod export;
 pub mod extract;
 pub mod fit;
