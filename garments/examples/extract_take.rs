@@ -64,7 +64,8 @@ fn one_take(folder: &Path, first: &Rigged, told: Option<GarmentType>, output: &P
         garment_type: told,
     };
     let clock = Instant::now();
-    let found = extract(&take, &ExtractSettings::default(), &|_| ())?;
+    let step = |share: f32| println!("  {share:.1} after {:.2} s", clock.elapsed().as_secs_f32());
+    let found = extract(&take, &ExtractSettings::default(), &step)?;
     println!("{} in {:.2} s: {:?}", folder.display(), clock.elapsed().as_secs_f32(), found.report);
     found.warnings.iter().for_each(|w| println!("  warning: {w}"));
     let out = output.join(folder.file_name().unwrap_or_default());
@@ -77,6 +78,14 @@ fn one_take(folder: &Path, first: &Rigged, told: Option<GarmentType>, output: &P
     labelled.attributes.insert("garment".into(), found.labels.garment.iter().map(f).collect());
     labelled.attributes.insert("odds".into(), found.labels.log_odds.clone());
     labelled.attributes.insert("confidence".into(), found.labels.confidence);
+    if let Some(path) = std::env::var_os("EVIDENCE") {
+        let graph = toile_garments::scan_graph::ScanGraph::new(&scan);
+        let e = toile_garments::evidence::measure(&take, &graph, &ExtractSettings::default());
+        let _ = path;
+        for (name, values) in [("height", e.height), ("color", e.color), ("facing", e.facing)] {
+            labelled.attributes.insert(name.into(), values);
+        }
+    }
     ply::write(&out.join("labels.ply"), &labelled)?;
     Ok(found.garment)
 }

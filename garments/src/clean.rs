@@ -16,7 +16,9 @@ const ISLAND_SHARE: f32 = 0.2;
 /// Loops with more vertices than this are not closed: triangulating costs the cube.
 const MOST_RIM_VERTICES: usize = 450;
 /// A vertex whose normal is further than this (cosine) from the earlier surface's lies on a step.
-const STEP_FACING: f32 = 0.6;
+const STEP_FACING: f32 = 0.75;
+/// What has the garment's colour by more than this, nats, is its folded rim and no step.
+const STEP_COLOR: f32 = 1.0;
 /// A patch or hole belongs to the garment when this share of its surroundings does.
 const SURROUNDED: f64 = 0.95;
 
@@ -45,31 +47,41 @@ fn flip(labels: &mut Labels, v: usize) {
     labels.confidence[v] = 0.5;
 }
 
-/// Takes the step between a hem and what lies below it off the garment: from its border inward, at most `depth`
-/// metres, every vertex that faces away from the earlier surface. The hem is the ridge where that step begins.
-pub fn peel_steps(scan: &Mesh, graph: &ScanGraph, evidence: &Evidence, labels: &mut Labels, depth: f32) {
+/// The step between a hem and what lies below it: from the garment's border inward, at most `depth` metres, every
+/// vertex that faces away from the earlier surface and does not have the garment's colour (`color_odds`). The hem is
+/// the ridge where that step begins.
+pub fn step_vertices(
+    scan: &Mesh,
+    graph: &ScanGraph,
+    evidence: &Evidence,
+    labels: &Labels,
+    color_odds: &[f32],
+    depth: f32,
+) -> Vec<u32> {
     let rim = open_vertices(scan);
+    let on_border = |v: u32| {
+        let old = |n: u32| !labels.garment[n as usize];
+        !old(v) && (rim[v as usize] || graph.neighbors.of(v as usize).iter().any(|&n| old(n)))
+    };
     let mut reached = vec![f32::INFINITY; graph.len()];
-    let mut queue: VecDeque<u32> = (0..graph.len() as u32)
-        .filter(|&v| {
-            let old = |n: u32| !labels.garment[n as usize];
-            !old(v) && (rim[v as usize] || graph.neighbors.of(v as usize).iter().any(|&n| old(n)))
-        })
-        .collect();
+    let mut queue: VecDeque<u32> = (0..graph.len() as u32).filter(|&v| on_border(v)).collect();
     queue.iter().for_each(|&v| reached[v as usize] = 0.0);
+    let mut steps = Vec::new();
     while let Some(v) = queue.pop_front() {
-        if evidence.facing[v as usize] > STEP_FACING {
+        let i = v as usize;
+        if evidence.facing[i] > STEP_FACING || color_odds[i] > STEP_COLOR {
             continue;
         }
-        labels.garment[v as usize] = false;
-        for &n in graph.neighbors.of(v as usize) {
-            let far = reached[v as usize] + (scan.positions[n as usize] - scan.positions[v as usize]).norm();
-            if labels.garment[n as usize] && far < depth && far < reached[n as usize] {
+        steps.push(v);
+        for &n in graph.neighbors.of(i) {
+            let far = reached[i] + (scan.positions[n as usize] - scan.positions[i]).norm();
+            if labels.garment[n as usize] && far < depth && reached[n as usize].is_infinite() {
                 reached[n as usize] = far;
                 queue.push_back(n);
             }
         }
     }
+    steps
 }
 
 /// True for the vertices on open edges.

@@ -17,6 +17,7 @@ use crate::{
     evidence::{self, Evidence},
     labels::{self, Labels},
     scan_graph::ScanGraph,
+    untangle,
 };
 
 /// Boundary loops at least this long are openings of the garment, metres; shorter ones are small holes.
@@ -25,6 +26,12 @@ const OPENING: f32 = 0.15;
 const SUNKEN: f32 = 0.012;
 /// So much sunken area makes a warning, square metres.
 const SUNKEN_AREA: f32 = 0.03;
+/// Log odds given to the steps at hems, nats.
+const STEP_ODDS: f32 = -2.0;
+/// Cloth this near to the inner thigh follows it, metres.
+const FOLLOWS: f32 = 0.06;
+/// New cloth on this share of the inner thighs goes around each leg by itself.
+pub(crate) const LEGS_APART: f32 = 0.2;
 /// Labels less sure than this are marked as unsure.
 const UNSURE: f32 = 0.7;
 
@@ -56,8 +63,8 @@ pub enum Warning {
     NothingNew,
     /// Scan areas lie well inside what was worn before: something was taken off, or pressed in; square metres.
     TakenOff(f32),
-    /// The garment is in this many separate large pieces on different parts of the body: two were put on at once?
-    SeveralPieces(usize),
+    /// What is new covers torso and each leg by itself, or lies in pieces on different parts of the body.
+    TwoAtOnce,
 }
 
 impl std::fmt::Display for Warning {
@@ -67,8 +74,8 @@ impl std::fmt::Display for Warning {
             Self::TakenOff(area) => {
                 write!(f, "{:.0} cm² of the scan lie inside what was worn before: was something taken off?", area * 1e4)
             }
-            Self::SeveralPieces(n) => {
-                write!(f, "the garment has {n} separate pieces: were two put on at once? They are kept as one layer")
+            Self::TwoAtOnce => {
+                write!(f, "what is new looks like two garments put on at once (or an overall); it is kept as one layer")
             }
         }
     }
@@ -130,15 +137,18 @@ pub fn extract(
     progress(0.3);
     let (garment_type, mut labels) = label(take, &graph, &evidence, settings);
     clean::drop_islands(&graph, &mut labels, settings);
+    take_off_steps(take, &graph, &evidence, &mut labels, settings);
     clean::settle_filled(&graph, &mut labels);
-    clean::peel_steps(take.scan, &graph, &evidence, &mut labels, settings.hem_depth);
     let pieces = clean::drop_islands(&graph, &mut labels, settings);
     progress(0.6);
     let in_take = garment_mesh(take, &graph, &labels, settings);
     progress(0.8);
     let weights = common_frame::weights(take, &in_take, settings);
     let garment = common_frame::to_common_frame(take, &in_take, &weights);
-    let warnings = warnings(&graph, &evidence, &in_take, pieces);
+    let mut warnings = warnings(&graph, &evidence, &in_take);
+    if looks_like_two(take, &graph, &evidence, &labels) {
+        warnings.push(Warning::TwoAtOnce);
+    }
     let report = report(take, &in_take, &evidence, garment_type, pieces);
     progress(1.0);
     Ok(Extraction { labels, in_take, garment, weights, report, warnings })
@@ -171,29 +181,64 @@ fn label(take: &Take, graph: &ScanGraph, evidence: &Evidence, settings: &Extract
     (guess, labels::label(graph, evidence, guess, Some(&free), settings))
 }
 
-/// Type from what is covered, what hangs between the legs and whether the front is open.
+/// Moves the border from the foot of each hem's step to its top.
+fn take_off_steps(
+    take: &Take,
+    graph: &ScanGraph,
+    evidence: &Evidence,
+    labels: &mut Labels,
+    settings: &ExtractSettings,
+) {
+    let colors = labels::color_model(graph, labels);
+    let steps = clean::step_vertices(take.scan, graph, evidence, labels, &colors, settings.hem_depth);
+    for v in steps {
+        labels.log_odds[v as usize] = labels.log_odds[v as usize].min(STEP_ODDS);
+    }
+    labels::relabel(graph, evidence, labels, settings);
+}
+
+/// Type from what is covered, what follows the inner thighs and whether the front is open.
 fn guess_type(take: &Take, graph: &ScanGraph, evidence: &Evidence, labels: &Labels) -> GarmentType {
+    let shares = covered_shares(graph, evidence, |v| labels.garment[v]);
+    GarmentType::guess(&shares, inner_thighs(take, labels), front_is_open(take, labels))
+}
+
+/// Share of each body part's scanned area for which `new` holds.
+fn covered_shares(graph: &ScanGraph, evidence: &Evidence, new: impl Fn(usize) -> bool) -> [f32; PART_COUNT] {
     let (mut covered, mut all) = ([0.0f32; PART_COUNT], [1e-6f32; PART_COUNT]);
     for v in 0..graph.len() {
         for (k, share) in evidence.parts[v].iter().enumerate() {
             all[k] += share * graph.areas[v];
-            covered[k] += if labels.garment[v] { share * graph.areas[v] } else { 0.0 };
+            covered[k] += if new(v) { share * graph.areas[v] } else { 0.0 };
         }
     }
-    let shares = std::array::from_fn(|k| covered[k] / all[k]);
-    let (hanging, open) = (hanging_share(take), front_is_open(take, labels));
-    GarmentType::guess(&shares, hanging, open)
+    std::array::from_fn(|k| covered[k] / all[k])
 }
 
-/// Share of the inner thighs that no scan surface follows: cloth hangs around both legs there.
-fn hanging_share(take: &Take) -> f32 {
+/// True where one piece covers torso and each leg by itself, or where large pieces cover different parts: a pair of
+/// socks covers the same parts twice, a shirt and a skirt do not.
+fn looks_like_two(take: &Take, graph: &ScanGraph, evidence: &Evidence, labels: &Labels) -> bool {
+    let covers = |shares: &[f32; PART_COUNT], part: BodyPart| shares[part as usize] > 0.35;
+    let all = covered_shares(graph, evidence, |v| labels.garment[v]);
+    let jumpsuit = covers(&all, BodyPart::Torso) && inner_thighs(take, labels) > LEGS_APART;
+    let (piece, areas) = graph.components(|v| labels.garment[v]);
+    let main = |k: usize| {
+        let shares = covered_shares(graph, evidence, |v| piece[v] == k as u32);
+        (0..PART_COUNT).max_by(|&a, &b| shares[a].total_cmp(&shares[b]))
+    };
+    let pieces: Vec<_> = (0..areas.len()).map(main).collect();
+    jumpsuit || pieces.windows(2).any(|p| p[0] != p[1])
+}
+
+/// Share of the inner thighs that new cloth follows: trousers do, a skirt hangs around both legs.
+fn inner_thighs(take: &Take, labels: &Labels) -> f32 {
     let joints = take.pose.joint_positions(take.skeleton);
     let across = joints[Joint::RightUpperLeg.index()] - joints[Joint::LeftUpperLeg.index()];
     let across = across.cast::<f32>().try_normalize(1e-6).unwrap_or(-Vector3::x());
     let bvh = Bvh::new(&take.scan.positions, &take.scan.triangles);
     let normals = take.scan.triangle_normals();
     let body_normals = take.body.vertex_normals();
-    let (mut bare, mut inner) = (0, 0);
+    let (mut followed, mut inner) = (0, 0);
     for v in 0..take.body.positions.len() {
         let side = match JOINTS.get(take.weights.joints[v][0] as usize) {
             Some(Joint::LeftUpperLeg) => 1.0,
@@ -201,13 +246,16 @@ fn hanging_share(take: &Take) -> f32 {
             _ => continue,
         };
         let n = body_normals[v];
-        if n.dot(&across) * side > 0.6 {
+        if n.dot(&across) * side > 0.8 {
             inner += 1;
-            let follows = |t: u32| normals[t as usize].dot(&n) > 0.3;
-            bare += usize::from(bvh.closest_where(&take.body.positions[v], 0.06, follows).is_none());
+            let hit = bvh.ray(&take.body.positions[v], &n, FOLLOWS).filter(|h| {
+                let new = labels.garment[take.scan.triangles[h.triangle as usize][0] as usize];
+                new && normals[h.triangle as usize].dot(&n) > 0.0
+            });
+            followed += usize::from(hit.is_some());
         }
     }
-    bare as f32 / inner.max(1) as f32
+    followed as f32 / inner.max(1) as f32
 }
 
 /// True where the middle of the back is covered much more than the middle of the front.
@@ -254,6 +302,7 @@ fn garment_mesh(take: &Take, graph: &ScanGraph, labels: &Labels, settings: &Extr
     mesh = clean::keep_large_pieces(&mesh, settings.piece_share);
     clean::fill_holes(&mut mesh, &bones, settings.hole_rim);
     mesh = remesh::isotropic(&mesh, settings.edge_length);
+    untangle::untangle(&mut mesh);
     mesh.recompute_normals();
     mesh
 }
@@ -264,7 +313,7 @@ fn bones(take: &Take) -> Vec<[Point3<f32>; 2]> {
     JOINTS.iter().filter_map(|j| Some([at[j.parent()?.index()].cast::<f32>(), at[j.index()].cast::<f32>()])).collect()
 }
 
-fn warnings(graph: &ScanGraph, evidence: &Evidence, garment: &Mesh, pieces: usize) -> Vec<Warning> {
+fn warnings(graph: &ScanGraph, evidence: &Evidence, garment: &Mesh) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if garment.is_empty() {
         warnings.push(Warning::NothingNew);
@@ -273,9 +322,6 @@ fn warnings(graph: &ScanGraph, evidence: &Evidence, garment: &Mesh, pieces: usiz
     let area: f32 = (0..graph.len()).filter(|&v| evidence.height[v] < -sunken).map(|v| graph.areas[v]).sum();
     if area > SUNKEN_AREA {
         warnings.push(Warning::TakenOff(area));
-    }
-    if pieces > 2 {
-        warnings.push(Warning::SeveralPieces(pieces));
     }
     warnings
 }

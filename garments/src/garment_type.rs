@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::body_parts::{BodyPart, PART_COUNT};
+use crate::{
+    body_parts::{BodyPart, PART_COUNT},
+    extract::LEGS_APART,
+};
 
 /// What kind of garment a layer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -37,9 +40,9 @@ impl GarmentType {
         }
     }
 
-    /// The type that fits a garment best, from the share of each body part's area that it covers and from how much of
-    /// what covers the legs hangs between or off them.
-    pub fn guess(covered: &[f32; PART_COUNT], hanging: f32, open_in_front: bool) -> Self {
+    /// The type that fits a garment best, from the share of each body part's area that it covers, the share of the
+    /// inner thighs that it follows, and whether it is open in front.
+    pub fn guess(covered: &[f32; PART_COUNT], inner_thighs: f32, open_in_front: bool) -> Self {
         let c = |part: BodyPart| covered[part as usize];
         let torso = c(BodyPart::Torso);
         let legs = c(BodyPart::UpperLeg);
@@ -48,8 +51,8 @@ impl GarmentType {
             () if torso > 0.35 && open_in_front => Self::Jacket,
             () if torso > 0.35 && legs > 0.4 => Self::Dress,
             () if torso > 0.35 => Self::Top,
-            () if pelvis > 0.3 && hanging > 0.25 => Self::Skirt,
-            () if pelvis > 0.3 => Self::Trousers,
+            () if pelvis > 0.3 && inner_thighs > LEGS_APART => Self::Trousers,
+            () if pelvis > 0.3 => Self::Skirt,
             () => Self::Other,
         }
     }
@@ -106,8 +109,8 @@ mod tests {
         };
         use BodyPart::*;
         let legs = covered(&[(Pelvis, 0.8), (UpperLeg, 1.0), (LowerLeg, 0.9)]);
-        assert_eq!(GarmentType::guess(&legs, 0.02, false), GarmentType::Trousers);
-        assert_eq!(GarmentType::guess(&legs, 0.6, false), GarmentType::Skirt);
+        assert_eq!(GarmentType::guess(&legs, 0.9, false), GarmentType::Trousers);
+        assert_eq!(GarmentType::guess(&legs, 0.02, false), GarmentType::Skirt);
         let torso = covered(&[(Torso, 0.9), (UpperArm, 0.6)]);
         assert_eq!(GarmentType::guess(&torso, 0.0, false), GarmentType::Top);
         assert_eq!(GarmentType::guess(&torso, 0.0, true), GarmentType::Jacket);

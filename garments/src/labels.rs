@@ -50,6 +50,13 @@ pub fn label(
     labels.unwrap_or_default()
 }
 
+/// Labels once more after the log odds were changed in places.
+pub fn relabel(graph: &ScanGraph, evidence: &Evidence, labels: &mut Labels, settings: &ExtractSettings) {
+    let edge_costs = edge_costs(graph, evidence, settings.smoothness);
+    labels.garment = cut(graph, &labels.log_odds, &edge_costs);
+    labels.confidence = confidence(graph, &labels.log_odds, &labels.garment);
+}
+
 fn odds(graph: &ScanGraph, evidence: &Evidence, garment_type: GarmentType, earlier: Option<&Labels>) -> Vec<f32> {
     let prior = garment_type.prior();
     let colors = earlier.map(|l| color_model(graph, l)).unwrap_or_else(|| vec![0.0; graph.len()]);
@@ -63,7 +70,7 @@ fn odds(graph: &ScanGraph, evidence: &Evidence, garment_type: GarmentType, earli
 }
 
 /// Log odds from the colours of garment and rest in `labels`, where the labels are sure.
-fn color_model(graph: &ScanGraph, labels: &Labels) -> Vec<f32> {
+pub fn color_model(graph: &ScanGraph, labels: &Labels) -> Vec<f32> {
     if graph.lab.is_empty() {
         return vec![0.0; graph.len()];
     }

@@ -33,6 +33,7 @@ pub mod scan_graph;
 pub mod settings;
 pub mod stack;
 pub mod surface_solve;
+pub mod untangle;
 
 pub use error::GarmentError;
 pub use extract::{Extraction, Take, Warning, extract};

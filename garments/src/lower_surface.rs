@@ -21,6 +21,7 @@ pub struct LowerSurface<'a> {
     /// Its unit vertex normals.
     pub normals: Vec<Vector3<f32>>,
     open_sides: Vec<[bool; 3]>,
+    open_vertices: Vec<bool>,
 }
 
 /// A point's place over a surface.
@@ -39,7 +40,12 @@ impl<'a> LowerSurface<'a> {
     pub fn new(mesh: &'a Mesh) -> Self {
         let edges = Edges::new(&mesh.triangles);
         let open = |e: u32| edges.uses[e as usize] == 1;
+        let mut open_vertices = vec![false; mesh.positions.len()];
+        for (e, _) in edges.vertices.iter().zip(&edges.uses).filter(|(_, u)| **u == 1) {
+            e.iter().for_each(|&v| open_vertices[v as usize] = true);
+        }
         Self {
+            open_vertices,
             mesh,
             bvh: Bvh::new(&mesh.positions, &mesh.triangles),
             normals: mesh.vertex_normals(),
@@ -67,8 +73,11 @@ impl<'a> LowerSurface<'a> {
         sum.try_normalize(1e-12).unwrap_or(self.normals[corners[0] as usize])
     }
 
-    /// True where the closest point lies on an open side.
+    /// True where the closest point lies on an open side, or on a vertex of one.
     pub fn on_rim(&self, hit: &Closest) -> bool {
-        (0..3).any(|k| self.open_sides[hit.triangle as usize][k] && hit.barycentric[(k + 2) % 3] < ON_SIDE)
+        let (sides, w) = (self.open_sides[hit.triangle as usize], hit.barycentric);
+        let corners = self.mesh.triangles[hit.triangle as usize];
+        (0..3).any(|k| sides[k] && w[(k + 2) % 3] < ON_SIDE)
+            || (0..3).any(|k| w[k] > 1.0 - 2.0 * ON_SIDE && self.open_vertices[corners[k] as usize])
     }
 }

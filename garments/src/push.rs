@@ -28,40 +28,29 @@ pub struct Push {
     pub by: Vector3<f32>,
 }
 
-/// Moves the mesh by the smooth displacement that follows `pushes`, which die out over `spread` metres. Returns how
-/// far each vertex moved.
+/// Moves the mesh by the smooth displacement that follows `pushes`, which die out over `spread` metres. Each push acts
+/// on all vertices that carry its point, by their shares, so that nothing moves further than the largest push. Returns
+/// how far each vertex moved.
 pub fn displace(mesh: &mut Mesh, system: &SurfaceSystem, pushes: &[Push], spread: f32) -> Vec<f32> {
     let n = mesh.positions.len();
     let anchor = 1.0 / (spread * spread).max(1e-8);
-    let mut diagonal = system.diagonal();
-    diagonal.iter_mut().zip(&system.areas).for_each(|(d, a)| *d += a * anchor + 1e-6);
+    let mut mass: Vec<f32> = system.areas.iter().map(|a| a * anchor + 1e-6).collect();
+    let mut right = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
     for push in pushes {
-        for (v, w) in push.corners.iter().zip(push.weights) {
-            diagonal[*v as usize] += STIFF * w * w;
+        for (&v, w) in push.corners.iter().zip(push.weights) {
+            mass[v as usize] += STIFF * w;
+            (0..3).for_each(|k| right[k][v as usize] += STIFF * w * push.by[k]);
         }
     }
-    let axes: Vec<Vec<f32>> = (0..3)
-        .map(|k| {
-            let mut right = vec![0.0; n];
-            for push in pushes {
-                for (v, w) in push.corners.iter().zip(push.weights) {
-                    right[*v as usize] += STIFF * w * push.by[k];
-                }
+    let diagonal: Vec<f32> = system.diagonal().iter().zip(&mass).map(|(d, m)| d + m).collect();
+    let axes = right.map(|right| {
+        conjugate_gradients(&right, vec![0.0; n], &diagonal, |x, out| {
+            for v in 0..n {
+                out[v] = mass[v] * x[v];
             }
-            conjugate_gradients(&right, vec![0.0; n], &diagonal, |x, out| {
-                for v in 0..n {
-                    out[v] = (system.areas[v] * anchor + 1e-6) * x[v];
-                }
-                system.add_stiffness(x, out);
-                for push in pushes {
-                    let at: f32 = push.corners.iter().zip(push.weights).map(|(v, w)| w * x[*v as usize]).sum();
-                    for (v, w) in push.corners.iter().zip(push.weights) {
-                        out[*v as usize] += STIFF * w * at;
-                    }
-                }
-            })
+            system.add_stiffness(x, out);
         })
-        .collect();
+    });
     mesh.positions
         .iter_mut()
         .enumerate()

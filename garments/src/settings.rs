@@ -30,7 +30,7 @@ pub struct ExtractSettings {
     /// Distance over which skin weights become those of the surroundings, metres: cloth this far off the body follows
     /// no single limb. Default 0.03.
     pub loose_distance: f32,
-    /// Mean edge length of the garment's mesh, metres; 0 keeps the scan's own triangles. Default 0.007.
+    /// Mean edge length of the garment's mesh, metres; 0 keeps the scan's own triangles. Default 0.006.
     pub edge_length: f32,
 }
 
@@ -47,7 +47,7 @@ impl Default for ExtractSettings {
             piece_share: 0.2,
             hole_rim: 0.15,
             loose_distance: 0.03,
-            edge_length: 0.007,
+            edge_length: 0.006,
         }
     }
 }

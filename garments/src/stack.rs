@@ -18,6 +18,7 @@ use crate::{
     lower_surface::LowerSurface,
     push::{Push, crossing_pushes, displace},
     surface_solve::SurfaceSystem,
+    untangle::untangle,
 };
 
 /// Pushes aim this much beyond the gap, so that rounds end.
@@ -42,7 +43,7 @@ pub struct LayerReport {
     pub self_crossings: [usize; 2],
     /// Least height of the layer's vertices over any lower layer, metres.
     pub least_gap_m: f32,
-    /// Mean and largest distance that its vertices moved, metres.
+    /// Mean distance that its vertices moved, metres.
     pub moved_mean_m: f32,
     /// Largest distance that a vertex moved, metres.
     pub moved_max_m: f32,
@@ -90,6 +91,7 @@ fn push_out(upper: &mut Mesh, lowers: &[LowerSurface], settings: &StackSettings)
     let system = SurfaceSystem::new(upper);
     let mut watch = Watch::new(upper, lowers);
     let mut report = LayerReport::default();
+    let mut fresh = false;
     for round in 0..settings.rounds {
         report.rounds = round + 1;
         let mut pushes = watch.samples(upper, lowers, settings);
@@ -98,9 +100,16 @@ fn push_out(upper: &mut Mesh, lowers: &[LowerSurface], settings: &StackSettings)
             pushes = crossing_pushes(upper, lowers, settings.gap * (1.0 + 0.25 * round as f32));
         }
         if pushes.is_empty() {
-            report.settled = true;
-            break;
+            // Believed only after the layer was untangled and everything was looked at afresh.
+            if fresh {
+                report.settled = true;
+                break;
+            }
+            untangle(upper);
+            (watch, fresh) = (Watch::new(upper, lowers), true);
+            continue;
         }
+        fresh = false;
         // Late rounds act locally, so that opposing pushes do not carry each other along.
         let spread = settings.spread / (1.0 + round as f32 / 8.0);
         let moved = displace(upper, &system, &pushes, spread);

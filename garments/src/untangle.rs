@@ -1,0 +1,97 @@
+//! A mesh that cuts through itself is smoothed where it does, until it does not.
+
+use toile_geometry::{
+    Mesh,
+    bvh::Bvh,
+    intersection::self_crossings,
+    topology::{Edges, VertexNeighbors},
+};
+
+/// Most rounds.
+const ROUNDS: usize = 12;
+/// Rings of neighbours that are smoothed around a crossing in the first round; one more every third round.
+const RINGS: usize = 1;
+/// Smoothing steps a round.
+const STEPS: usize = 4;
+
+/// Smooths around the triangles of `mesh` that cross one another. Returns how many pairs are left.
+pub fn untangle(mesh: &mut Mesh) -> usize {
+    let mut neighbors = None;
+    for round in 0..=ROUNDS {
+        let pairs = self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles));
+        if pairs.is_empty() || round == ROUNDS {
+            return pairs.len();
+        }
+        let neighbors = neighbors.get_or_insert_with(|| VertexNeighbors::new(mesh.positions.len(), &mesh.triangles));
+        let seeds = pairs.iter().flatten().flat_map(|&t| mesh.triangles[t as usize]);
+        let patch = grow(seeds.collect(), neighbors, RINGS + round / 3);
+        smooth(mesh, neighbors, &patch);
+    }
+    0
+}
+
+/// The vertices and `rings` rings around them, ascending.
+fn grow(mut patch: Vec<u32>, neighbors: &VertexNeighbors, rings: usize) -> Vec<u32> {
+    for _ in 0..rings {
+        let more: Vec<u32> = patch.iter().flat_map(|&v| neighbors.of(v as usize)).copied().collect();
+        patch.extend(more);
+        patch.sort_unstable();
+        patch.dedup();
+    }
+    patch.sort_unstable();
+    patch.dedup();
+    patch
+}
+
+/// Moves each vertex of the patch halfway to its neighbours' mean; vertices of a rim heed only the rim.
+fn smooth(mesh: &mut Mesh, neighbors: &VertexNeighbors, patch: &[u32]) {
+    let edges = Edges::new(&mesh.triangles);
+    let mut rim = std::collections::BTreeMap::<u32, Vec<u32>>::new();
+    for (&[a, b], _) in edges.vertices.iter().zip(&edges.uses).filter(|(_, u)| **u == 1) {
+        rim.entry(a).or_default().push(b);
+        rim.entry(b).or_default().push(a);
+    }
+    for _ in 0..STEPS {
+        let moved: Vec<_> = patch
+            .iter()
+            .map(|&v| {
+                let around = rim.get(&v).map_or(neighbors.of(v as usize), Vec::as_slice);
+                let p = mesh.positions[v as usize];
+                let sum = around.iter().fold(nalgebra::Vector3::zeros(), |s, &n| s + mesh.positions[n as usize].coords);
+                if around.is_empty() { p } else { p + (sum / around.len() as f32 - p.coords) * 0.5 }
+            })
+            .collect();
+        patch.iter().zip(moved).for_each(|(&v, p)| mesh.positions[v as usize] = p);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+
+    use super::*;
+
+    #[test]
+    fn a_fold_is_taken_out_and_the_rest_stays() {
+        let n = 20u32;
+        let positions: Vec<Point3<f32>> = (0..n * n)
+            .map(|i| {
+                let (x, y) = ((i % n) as f32 * 0.01, (i / n) as f32 * 0.01);
+                Point3::new(x, y, 0.0)
+            })
+            .collect();
+        let triangles = (0..n - 1)
+            .flat_map(|j| (0..n - 1).map(move |i| j * n + i))
+            .flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]])
+            .collect();
+        let mut mesh = Mesh::new(positions, triangles);
+        mesh.positions[(10 * n + 10) as usize] = Point3::new(0.125, 0.125, -0.002);
+        mesh.positions[(11 * n + 11) as usize].z = 0.004;
+        mesh.positions[(10 * n + 11) as usize] = Point3::new(0.095, 0.118, 0.003);
+        let before = mesh.clone();
+        assert!(!self_crossings(&mesh, &Bvh::new(&mesh.positions, &mesh.triangles)).is_empty());
+        assert_eq!(untangle(&mut mesh), 0);
+        let far = |p: &Point3<f32>| (p - Point3::new(0.11, 0.11, 0.0)).norm() > 0.06;
+        assert!(mesh.positions.iter().zip(&before.positions).all(|(a, b)| a == b || !far(b)));
+    }
+}

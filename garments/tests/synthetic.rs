@@ -1,0 +1,278 @@
+//! Garments on a synthetic person: a column of cloth-covered rings with known truth.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use toile_character::{JOINT_COUNT, Joint, Pose, Skeleton, SkinWeights, skinning};
+use toile_garments::{ExtractSettings, GarmentError, GarmentType, StackSettings, Take, Warning, extract, stack};
+use toile_geometry::{
+    Mesh,
+    bvh::Bvh,
+    intersection::crossings,
+    topology::{boundary_loops, loop_length},
+};
+
+const SKIN: [u8; 3] = [205, 160, 140];
+const BLUE: [u8; 3] = [40, 60, 160];
+const RADIUS: f32 = 0.12;
+const HEIGHT: f32 = 1.2;
+
+/// A column with `radius(y, angle)` and `color(y)`, rings 5 mm apart.
+fn column(radius: impl Fn(f32, f32) -> f32, color: impl Fn(f32) -> [u8; 3]) -> Mesh {
+    let (around, rows) = (150u32, 240u32);
+    let mut mesh = Mesh::default();
+    for r in 0..=rows {
+        for i in 0..around {
+            let (y, a) = (HEIGHT * r as f32 / rows as f32, i as f32 / around as f32 * std::f32::consts::TAU);
+            let at = radius(y, a);
+            mesh.positions.push(Point3::new(at * a.sin(), y, at * a.cos()));
+            mesh.colors.push(color(y));
+        }
+    }
+    for r in 0..rows {
+        for i in 0..around {
+            let (a, b) = (r * around + i, r * around + (i + 1) % around);
+            mesh.triangles.extend([[a, b, b + around], [a, b + around, a + around]]);
+        }
+    }
+    mesh
+}
+
+fn noise(y: f32, a: f32) -> f32 {
+    0.0004 * ((y * 211.0).sin() * (a * 17.0).cos() + (y * 97.0 + a * 31.0).sin())
+}
+
+fn inside(y: f32) -> bool {
+    (0.3..0.8).contains(&y)
+}
+
+/// A cloth `thick` metres off the body between heights 0.3 and 0.8.
+fn dressed(thick: f32, color: [u8; 3]) -> Mesh {
+    let radius = move |y: f32, a: f32| RADIUS + noise(y, a) + if inside(y) { thick } else { 0.0 };
+    column(radius, move |y| if inside(y) { color } else { SKIN })
+}
+
+fn bare() -> Mesh {
+    column(|_, _| RADIUS, |_| SKIN)
+}
+
+struct Person {
+    body: Mesh,
+    weights: SkinWeights,
+    skeleton: Skeleton,
+}
+
+/// Hips below 0.4, spine to 0.8, head above, blended over 20 cm; the other joints lie along the axis.
+fn person() -> Person {
+    let body = bare();
+    let mut weights = SkinWeights::default();
+    for p in &body.positions {
+        let step = |edge: f32| ((p.y - edge) / 0.2 + 0.5).clamp(0.0, 1.0);
+        let (chest, head) = (step(0.4), step(0.8));
+        weights.push(&[
+            (Joint::Hips as u8, 1.0 - chest),
+            (Joint::Spine as u8, chest * (1.0 - head)),
+            (Joint::Head as u8, chest * head),
+        ]);
+    }
+    let mut rest = [Point3::new(0.0, 0.8, 0.0); JOINT_COUNT];
+    rest[Joint::Hips.index()].y = 0.2;
+    rest[Joint::Spine.index()].y = 0.4;
+    Person { body, weights, skeleton: Skeleton { rest } }
+}
+
+fn take<'a>(person: &'a Person, scan: &'a Mesh, previous: &'a Mesh, pose: &'a Pose) -> Take<'a> {
+    Take {
+        scan,
+        previous,
+        body: &person.body,
+        weights: &person.weights,
+        skeleton: &person.skeleton,
+        pose,
+        pose0: pose,
+        garment_type: Some(GarmentType::Other),
+    }
+}
+
+/// Share of the cloth's height that was found against all that was taken.
+fn iou(scan: &Mesh, labels: &[bool]) -> f64 {
+    let (mut both, mut either) = (0, 0);
+    for (p, &l) in scan.positions.iter().zip(labels) {
+        both += usize::from(inside(p.y) && l);
+        either += usize::from(inside(p.y) || l);
+    }
+    both as f64 / either.max(1) as f64
+}
+
+#[test]
+fn cloth_is_found_by_colour_and_shape_by_shape_alone_and_by_colour_alone() {
+    let (person, pose, before) = (person(), Pose::identity(), bare());
+    for (thick, color, least) in [(0.01, BLUE, 0.97), (0.01, SKIN, 0.93), (0.001, BLUE, 0.97)] {
+        let scan = dressed(thick, color);
+        let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+        let iou = iou(&scan, &found.labels.garment);
+        assert!(iou >= least, "{thick} m of {color:?}: IoU {iou}");
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+        let loops = boundary_loops(&found.garment.triangles);
+        assert_eq!(loops.len(), 2);
+        let round = std::f32::consts::TAU * (RADIUS + thick);
+        for l in loops {
+            let length = loop_length(&found.garment.positions, &l);
+            assert!((length / round - 1.0).abs() < 0.05, "hem of {length} m around {round} m");
+        }
+    }
+}
+
+#[test]
+fn stripes_are_one_garment() {
+    let (person, pose, before) = (person(), Pose::identity(), bare());
+    let stripes = |y: f32| match () {
+        () if !inside(y) => SKIN,
+        () if (y * 14.0) as i32 % 2 == 0 => [200, 40, 40],
+        () => [235, 230, 225],
+    };
+    let scan = column(|y, a| RADIUS + noise(y, a) + if inside(y) { 0.004 } else { 0.0 }, stripes);
+    let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    assert!(iou(&scan, &found.labels.garment) > 0.96);
+    assert_eq!(found.report.pieces, 1);
+}
+
+#[test]
+fn nothing_new_and_something_taken_off_are_said() {
+    let (person, pose) = (person(), Pose::identity());
+    let (before, scan) = (bare(), dressed(0.0, SKIN));
+    let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    assert_eq!(found.warnings, [Warning::NothingNew]);
+    assert!(found.garment.is_empty());
+    let coat = dressed(0.03, BLUE);
+    let mut skin_again = take(&person, &scan, &coat, &pose);
+    skin_again.garment_type = None;
+    let found = extract(&skin_again, &ExtractSettings::default(), &|_| ()).unwrap();
+    assert!(found.warnings.iter().any(|w| matches!(w, Warning::TakenOff(_))), "{:?}", found.warnings);
+}
+
+#[test]
+fn a_hidden_patch_is_closed_and_marked() {
+    let (person, pose, before) = (person(), Pose::identity(), bare());
+    let scan = dressed(0.008, BLUE);
+    let hole = Point3::new(0.0, 0.55, RADIUS);
+    let (scan, _) = scan.filter_triangles(|t| (scan.positions[scan.triangles[t][0] as usize] - hole).norm() > 0.05);
+    let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    assert_eq!(boundary_loops(&found.garment.triangles).len(), 2);
+    let filled = &found.garment.attributes["filled"];
+    let marked = found.garment.positions.iter().zip(filled).filter(|(_, f)| **f > 0.5);
+    assert!(marked.clone().count() > 20);
+    assert!(marked.clone().all(|(p, _)| (p - hole).norm() < 0.07));
+}
+
+#[test]
+fn a_bent_take_comes_back_to_the_common_frame() {
+    let (mut person, before, scan) = (person(), bare(), dressed(0.01, BLUE));
+    let mut pose = Pose::identity();
+    *pose.rotation_mut(Joint::Spine) = UnitQuaternion::from_euler_angles(0.15, 0.3, -0.1);
+    pose.translation = Vector3::new(0.1, 0.02, -0.3);
+    let transforms = pose.skinning_transforms(&person.skeleton);
+    let weights = person.weights.clone();
+    let bend = |mesh: &Mesh| Mesh { positions: skinning::skin(&mesh.positions, &weights, &transforms), ..mesh.clone() };
+    let (scan, before) = (bend(&scan), bend(&before));
+    person.body = bend(&person.body);
+    let mut bent = take(&person, &scan, &before, &pose);
+    let rest = Pose::identity();
+    bent.pose0 = &rest;
+    let found = extract(&bent, &ExtractSettings::default(), &|_| ()).unwrap();
+    assert!(found.garment.positions.len() > 1000);
+    let worst = found.garment.positions.iter().map(|p| (p.x.hypot(p.z) - RADIUS - 0.01).abs()).fold(0.0, f32::max);
+    assert!(worst < 0.006, "{worst}");
+    assert!(found.in_take.positions.iter().zip(&found.garment.positions).any(|(a, b)| (a - b).norm() > 0.2));
+}
+
+#[test]
+fn told_types_are_kept_and_others_guessed() {
+    let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
+    let mut input = take(&person, &scan, &before, &pose);
+    let told = extract(&input, &ExtractSettings::default(), &|_| ()).unwrap().report;
+    assert!((told.garment_type, told.type_guessed) == (GarmentType::Other, false));
+    input.garment_type = None;
+    let guessed = extract(&input, &ExtractSettings::default(), &|_| ()).unwrap().report;
+    assert!((guessed.garment_type, guessed.type_guessed) == (GarmentType::Top, true), "{guessed:?}");
+}
+
+#[test]
+fn bad_input_is_refused() {
+    let (person, pose, before, empty) = (person(), Pose::identity(), bare(), Mesh::default());
+    let refuse = |take: &Take| extract(take, &ExtractSettings::default(), &|_| ()).unwrap_err();
+    assert_eq!(refuse(&take(&person, &empty, &before, &pose)), GarmentError::Empty("scan"));
+    let mut broken = before.clone();
+    broken.positions[3].x = f32::NAN;
+    assert!(matches!(refuse(&take(&person, &broken, &before, &pose)), GarmentError::Mesh(_)));
+    let short = Person { weights: SkinWeights::default(), ..person };
+    assert!(matches!(refuse(&take(&short, &before, &before, &pose)), GarmentError::Mismatch(_)));
+}
+
+/// A closed body, a shirt that cuts in and out of it, and a coat that cuts in and out of both.
+fn crossing_layers() -> (Mesh, Vec<Mesh>) {
+    let mut body = bare();
+    let rings = body.positions.len() as u32 / 150;
+    for (row, y) in [(0, 0.0), (rings - 1, HEIGHT)] {
+        let center = body.positions.len() as u32;
+        body.positions.push(Point3::new(0.0, y, 0.0));
+        body.colors.push(SKIN);
+        for i in 0..150 {
+            let (a, b) = (row * 150 + i, row * 150 + (i + 1) % 150);
+            body.triangles.push(if row == 0 { [center, b, a] } else { [center, a, b] });
+        }
+    }
+    let band = |lo: f32, hi: f32, radius: &dyn Fn(f32, f32) -> f32| {
+        let full = column(radius, |_| BLUE);
+        full.filter_triangles(|t| full.triangles[t].iter().all(|&v| (lo..hi).contains(&full.positions[v as usize].y))).0
+    };
+    let shirt = band(0.3, 0.9, &|y, a| RADIUS + 0.001 + 0.004 * (y * 60.0).sin() * (3.0 * a).cos());
+    let coat = band(0.2, 0.95, &|y, a| RADIUS + 0.003 + 0.005 * (y * 45.0 + 2.0 * a).cos());
+    (body, vec![shirt, coat])
+}
+
+#[test]
+fn stacked_layers_have_their_gap_and_cross_nowhere() {
+    let (body, mut layers) = crossing_layers();
+    let before = layers.clone();
+    let report = stack(&body, &mut layers, &StackSettings::default(), &|_| ()).unwrap();
+    for (k, layer) in report.layers.iter().enumerate() {
+        assert!(layer.settled && layer.crossing_pairs == 0, "layer {k}: {layer:?}");
+        assert!(layer.least_gap_m >= 0.001, "layer {k}: {layer:?}");
+        assert!(layer.self_crossings[1] <= layer.self_crossings[0]);
+    }
+    let all = [&body, &layers[0], &layers[1]];
+    for (i, lower) in all.iter().enumerate() {
+        let bvh = Bvh::new(&lower.positions, &lower.triangles);
+        for upper in &all[i + 1..] {
+            assert!(crossings(upper, lower, &bvh).is_empty());
+        }
+    }
+    let mean = |k: usize| {
+        let sum: f32 = before[k].positions.iter().zip(&layers[k].positions).map(|(a, b)| (a - b).norm()).sum();
+        sum / before[k].positions.len() as f32
+    };
+    assert!(mean(0) < 0.004 && mean(1) < 0.006, "{} {}", mean(0), mean(1));
+}
+
+#[test]
+fn layers_that_are_apart_stay_to_the_bit() {
+    let body = crossing_layers().0;
+    let far = column(|_, _| RADIUS + 0.03, |_| BLUE);
+    let mut layers = vec![far.clone()];
+    stack(&body, &mut layers, &StackSettings::default(), &|_| ()).unwrap();
+    assert_eq!(layers[0].positions, far.positions);
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
+            let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+            let (body, mut layers) = crossing_layers();
+            stack(&body, &mut layers, &StackSettings::default(), &|_| ()).unwrap();
+            (found.garment, found.weights, layers)
+        })
+    };
+    assert_eq!(run(1), run(2));
+}
