@@ -173,6 +173,15 @@ fn read_report(folder: &Path) -> Report {
     serde_json::from_slice(&bytes).unwrap_or_default()
 }
 
+/// A value as JSON with the shortest digits that give its numbers back (`json!` widens f32 first: 0.10000000149).
+///
+/// # Errors
+/// [`StudioError::Format`] where a value cannot be written as JSON.
+pub fn plain(value: &impl Serialize) -> Result<Value, StudioError> {
+    let text = serde_json::to_vec(value).and_then(|bytes| serde_json::from_slice(&bytes));
+    text.map_err(|e| StudioError::format(Path::new("JSON"), e))
+}
+
 /// JSON as the project writes it: indented, keys in a fixed order, a line break at the end.
 ///
 /// # Errors
@@ -252,6 +261,12 @@ mod tests {
         fs::write(bench.dir.path().join("build/report.json"), b"{ torn").unwrap();
         bench.run(json!(2)).unwrap();
         assert_eq!(bench.runs.get(), 6);
+    }
+
+    #[test]
+    fn numbers_stay_short() {
+        assert_eq!(plain(&0.1f32).unwrap().to_string(), "0.1");
+        assert_eq!(plain(&[1.5f32, 2.0]).unwrap(), json!([1.5, 2.0]));
     }
 
     #[test]

@@ -24,7 +24,7 @@ fn missing_frames_are_counted_and_the_rest_is_kept() {
     }
     let answer = exits(3, toile().args(recording.import("body")));
     let lost = answer["lost"].to_string();
-    assert!(lost.contains("000003") || lost.contains("frame 3") || lost.contains("1 frame"), "{answer}");
+    assert!(lost.contains("1 missing") && lost.contains("(3)"), "{answer}");
     assert!(recording.subject().join("takes/00-body.mcap").is_file());
 }
 
@@ -38,7 +38,7 @@ fn unequal_counts_of_depth_and_colour_are_told() {
 
 #[test]
 fn a_wrong_camera_field_is_named() {
-    for (field, value) in [("fx", "\"wide\""), ("fx", "-1.0"), ("width", "0"), ("depth_scale", "null")] {
+    for (field, value) in [("fx", "\"wide\""), ("fx", "-1.0"), ("width", "0"), ("depth_scale", "-0.001")] {
         let recording = Recording::new(3, 3);
         recording.set_camera(field, Some(value));
         let answer = exits(1, toile().args(recording.import("body")));
@@ -107,7 +107,7 @@ fn an_empty_mcap_and_a_foreign_one_are_told_apart_from_ours() {
 
 #[test]
 fn a_torn_recording_is_read_as_far_as_it_goes_and_exits_with_3() {
-    let recording = Recording::with_noise(40);
+    let recording = Recording::with_noise(20);
     exits(0, toile().args(recording.import("body")));
     let take = recording.subject().join("takes/00-body.mcap");
     let bytes = fs::read(&take).unwrap();

@@ -1,6 +1,8 @@
 //! The recorded session, end to end: every layer is there, any number of threads and any interruption give the same
 //! bytes, and outside programs accept the files.
 
+#![allow(clippy::unwrap_used)] // all of it is test code
+
 use std::{
     collections::BTreeMap,
     fs,

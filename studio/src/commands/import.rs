@@ -7,7 +7,7 @@ use std::{
 
 use serde_json::json;
 use toile_capture::{
-    GarmentType, PendingTake, Recorder, RecorderOptions, Subject,
+    GarmentType, PendingTake, Recorder, RecorderOptions, Replay, Subject,
     import::{self, Format, ImportReport},
 };
 
@@ -96,7 +96,9 @@ impl Import {
     fn answer(&self, torn: Vec<String>, report: &ImportReport, take: &Path, kept: Option<PathBuf>) -> Answer {
         let mut lost = torn;
         if !report.is_complete() {
-            lost.push(format!("{}: {report}; all others are in the take", self.folder.display()));
+            let missing = missing_numbers(take);
+            let numbers = if missing.is_empty() { String::new() } else { format!(" ({})", missing.join(", ")) };
+            lost.push(format!("{}: {report}{numbers}; everything else is in the take", self.folder.display()));
         }
         let mut text = format!("{}: {} frames\n", take.display(), report.frames);
         if let Some(kept) = &kept {
@@ -105,6 +107,26 @@ impl Import {
         Answer { text, results: json!({ "take": take, "report": report, "kept": kept }), lost, ..Answer::default() }
     }
 }
+
+/// Numbers of the frames that are missing between those of a take; of many, the first few.
+fn missing_numbers(take: &Path) -> Vec<String> {
+    let Ok(replay) = Replay::open(take) else { return Vec::new() };
+    let frames: Vec<_> = (0..replay.len()).filter_map(|i| replay.info(i)).collect();
+    let mut missing = Vec::new();
+    for pair in frames.windows(2) {
+        let (before, after, lost) = (pair[0].device_frame, pair[1].device_frame, u64::from(pair[1].lost_before));
+        let step = after.saturating_sub(before) / (lost + 1);
+        missing.extend((1..=lost).map(|k| (before + k * step).to_string()));
+    }
+    if missing.len() > NAMED {
+        missing.truncate(NAMED);
+        missing.push("...".into());
+    }
+    missing
+}
+
+/// So many missing frames are named.
+const NAMED: usize = 12;
 
 fn record(opened: &mut Opened, path: &Path, session: &Session) -> Result<ImportReport, StudioError> {
     let options = RecorderOptions { replace_part: true, ..RecorderOptions::default() };

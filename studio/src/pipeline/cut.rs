@@ -15,7 +15,7 @@ use crate::{
         body_file::{Body, read_pose},
         skin_attributes::with_weights,
     },
-    stage::{Product, Record, Stage},
+    stage::{Product, Record, Stage, plain},
 };
 
 /// Raised whenever the same inputs and settings give another garment.
@@ -48,7 +48,7 @@ pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
             folders.body_json(),
             folders.pose(run.first_layer()),
         ],
-        settings: json!({ "extract": settings, "type": told }),
+        settings: json!({ "extract": plain(&settings)?, "type": told }),
         outputs: vec![folders.cut(layer), folders.unstacked(layer)],
     };
     stage.run(&run.label(layer, "cut"), run.progress, |progress| {
@@ -86,7 +86,7 @@ fn product(run: &Run, layer: &str, found: &Extraction) -> Result<Product, Studio
             (run.folders.cut(layer), ply::encode(&found.in_take)),
             (run.folders.unstacked(layer), ply::encode(&with_weights(&found.garment, &found.weights))),
         ],
-        result: json!(found.report),
+        result: plain(&found.report)?,
         warnings,
         ..Product::default()
     })

@@ -1,14 +1,13 @@
 //! Stage `export`: the dressed avatar as files.
 //!
-//! Reads the body, every garment with its weights, scan 0 (for the body's colours) and the motion. Writes `avatar.glb`
-//! and `avatar.vrm`.
+//! Reads the body, every garment with its weights, and the motion. Writes `avatar.glb` and `avatar.vrm`.
 
 use std::path::Path;
 
 use serde_json::json;
 use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, write_glb, write_vrm};
 use toile_character::{Pose, Skeleton, SkinWeights};
-use toile_geometry::{Mesh, color_transfer::closest_colors};
+use toile_geometry::Mesh;
 
 use crate::{
     StudioError,
@@ -27,12 +26,7 @@ pub const COST: f64 = 1.5;
 /// [`StudioError`] where the motion cannot be used or files cannot be read or written.
 pub fn run(run: &Run, body: &Body, bvh: Option<&Path>) -> Result<Record, StudioError> {
     let folders = &run.folders;
-    let mut inputs = vec![
-        folders.body_mesh(),
-        folders.body_json(),
-        folders.pose(run.first_layer()),
-        folders.scan(run.first_layer()),
-    ];
+    let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
     inputs.extend(run.garments().flat_map(|l| [folders.garment(l), folders.unstacked(l)]));
     inputs.extend(bvh.map(Path::to_path_buf));
     let types: Vec<Option<String>> = (0..run.layers.len()).map(|n| garment_type(run, n)).collect();
@@ -91,12 +85,10 @@ pub fn rigged_scan(
     write_glb(&avatar).map_err(|e| StudioError::stage(Path::new("rigged_scan.glb"), e))
 }
 
-/// The avatar at rest in scan 0's pose: the body in the scan's colours, and every garment.
+/// The avatar at rest in scan 0's pose: the body and every garment.
 fn dressed(run: &Run, body: &Body, types: &[Option<String>]) -> Result<Avatar, StudioError> {
     let folders = &run.folders;
-    let mut mesh = run.read_mesh(&folders.body_mesh())?;
-    let scan = run.read_mesh(&folders.scan(run.first_layer()))?;
-    mesh.colors = closest_colors(&scan, &mesh.positions, &mesh.vertex_normals());
+    let mesh = run.read_mesh(&folders.body_mesh())?;
     let weights = body.skinned.weights.clone();
     let mut layers = vec![AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None }];
     for (n, layer) in run.layers.iter().enumerate().filter(|(_, l)| run.garments().any(|g| g == l.as_str())) {

@@ -6,15 +6,14 @@
 use std::path::PathBuf;
 
 use nalgebra::Translation3;
-use serde_json::json;
 use toile_character::BodyModel;
 use toile_fitting::{BodyFit, FitReport, FitSettings, Mend, Verdict, fit_body, rig_scan};
-use toile_geometry::{Mesh, Rigid, ply};
+use toile_geometry::{Mesh, Rigid, color_transfer::closest_colors, ply};
 
 use crate::{
     StudioError,
     pipeline::{Run, body_file::pose_bytes, deliverables},
-    stage::{self, Product, Record, Stage},
+    stage::{self, Product, Record, Stage, plain},
 };
 
 /// Raised whenever the same scan and settings give another body.
@@ -61,7 +60,7 @@ pub fn fit(run: &Run, place: &Place, model: &BodyModel) -> Result<Record, Studio
         root: &run.folders.root,
         folder: place.folder.clone(),
         inputs: vec![place.scan.clone()],
-        settings: json!(settings),
+        settings: plain(&settings)?,
         outputs: names.iter().map(|n| at(n)).chain([place.pose.clone()]).collect(),
     };
     stage.run(&run.label("body", "fit"), run.progress, |progress| {
@@ -97,15 +96,17 @@ fn product(place: &Place, scan: &Mesh, fit: &BodyFit) -> Result<Product, StudioE
     let scan = fit.mend.apply(scan);
     let weights = rig_scan(&scan, &fit.body, &fit.pose);
     let rigged = deliverables::rigged_scan(&scan, &weights, &fit.skeleton, &fit.pose)?;
+    let mut body = fit.posed_body();
+    body.colors = closest_colors(&scan, &body.positions, &body.normals);
     let files = vec![
-        (at("body.ply"), ply::encode(&fit.posed_body())),
+        (at("body.ply"), ply::encode(&body)),
         (at("model.ply"), ply::encode(&fit.model_mesh)),
         (at("rest.ply"), ply::encode(&fit.body.mesh)),
         (at("rigged_scan.glb"), rigged),
         (at("body.json"), stage::pretty(&fit.summary())?),
         (place.pose.clone(), pose_bytes(&fit.pose)?),
     ];
-    Ok(Product { files, result: json!(report), warnings: warnings(report), ..Product::default() })
+    Ok(Product { files, result: plain(report)?, warnings: warnings(report), ..Product::default() })
 }
 
 fn warnings(report: &FitReport) -> Vec<String> {

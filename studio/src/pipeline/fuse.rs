@@ -4,14 +4,13 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
 use toile_fusion::{FusionSettings, fuse};
 use toile_geometry::ply;
 
 use crate::{
     StudioError,
     pipeline::{Run, opened::Opened},
-    stage::{Product, Record, Stage},
+    stage::{Product, Record, Stage, plain},
 };
 
 /// Raised whenever the same recording and settings give another scan.
@@ -46,7 +45,7 @@ pub fn fuse_recording(
         root: &run.folders.root,
         folder: folder.to_path_buf(),
         inputs: files_of(recording)?,
-        settings: json!(settings),
+        settings: plain(settings)?,
         outputs: outputs.clone(),
     };
     stage.run(&run.label(name, "fuse"), run.progress, |progress| {
@@ -61,7 +60,7 @@ pub fn fuse_recording(
             (outputs[0].clone(), ply::encode(&scan.mesh)),
             (outputs[1].clone(), scan.trajectory_tum().into_bytes()),
         ];
-        Ok(Product { files, warnings, lost, result: json!(scan.report), timings: json!(scan.timings) })
+        Ok(Product { files, warnings, lost, result: plain(&scan.report)?, timings: plain(&scan.timings)? })
     })
 }
 

@@ -143,7 +143,8 @@ fn motion_frames(
     let rest_from_pose0 = body.pose0.skinning_transforms(skeleton);
     let rest: Vec<_> = layers.iter().map(|(mesh, w)| skinning::unskin(&mesh.positions, w, &rest_from_pose0)).collect();
     let count = motion.poses.len();
-    let shown = (0..FRAMES.min(count)).map(|k| k * count / FRAMES.min(count).max(1));
+    // A little more than a quarter each, so that a motion that repeats is not shown four times at the same phase.
+    let shown = (0..FRAMES.min(count)).map(|k| k * 5 * count / (4 * FRAMES.max(1)) % count.max(1));
     let frame = |k: usize| {
         let transforms = motion.poses[k].skinning_transforms(skeleton);
         let posed = layers.iter().zip(&rest).map(|((mesh, weights), rest)| {

@@ -2,7 +2,6 @@
 //!
 //! Reads the scan, the scan of the take before with its pose, and the body. Writes `pose.json` and `body.ply`.
 
-use serde_json::json;
 use toile_fitting::{UnderFit, UnderSettings, Verdict, pose_under, rigged_scan};
 use toile_geometry::{Mesh, ply};
 
@@ -12,7 +11,7 @@ use crate::{
         Run,
         body_file::{Body, pose_bytes, read_pose},
     },
-    stage::{Product, Record, Stage},
+    stage::{Product, Record, Stage, plain},
 };
 
 /// Raised whenever the same inputs and settings give another pose.
@@ -42,7 +41,7 @@ pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
             folders.body_rest(),
             folders.body_json(),
         ],
-        settings: json!(settings),
+        settings: plain(&settings)?,
         outputs: vec![pose_path.clone(), body_path.clone()],
     };
     stage.run(&run.label(layer, "pose"), run.progress, |progress| {
@@ -60,7 +59,7 @@ pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
         Ok(Product {
             files: vec![(pose_path.clone(), pose_bytes(&fit.pose)?), (body_path.clone(), posed)],
             warnings: warnings(layer, &fit),
-            result: json!(fit.report),
+            result: plain(&fit.report)?,
             ..Product::default()
         })
     })

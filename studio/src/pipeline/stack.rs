@@ -2,14 +2,13 @@
 //!
 //! Reads `body/body.ply` and each `unstacked.ply`. Writes each `garment.ply`, in scan 0's pose and frame.
 
-use serde_json::json;
 use toile_garments::{LayerReport, StackSettings, stack};
 use toile_geometry::{Mesh, ply};
 
 use crate::{
     StudioError,
     pipeline::{Run, skin_attributes::take_weights},
-    stage::{Product, Record, Stage},
+    stage::{Product, Record, Stage, plain},
 };
 
 /// Raised whenever the same inputs and settings give other garments.
@@ -33,7 +32,7 @@ pub fn run(run: &Run) -> Result<Record, StudioError> {
         root: &folders.root,
         folder: folders.layers(),
         inputs,
-        settings: json!(settings),
+        settings: plain(&settings)?,
         outputs: garments.iter().map(|l| folders.garment(l)).collect(),
     };
     stage.run(&run.label("layers", "stack"), run.progress, |progress| {
@@ -43,7 +42,7 @@ pub fn run(run: &Run) -> Result<Record, StudioError> {
             stack(&body, &mut layers, &settings, progress).map_err(|e| StudioError::stage(&folders.root, e))?;
         let files = garments.iter().zip(&layers).map(|(l, mesh)| (folders.garment(l), ply::encode(mesh))).collect();
         let warnings = garments.iter().zip(&report.layers).filter_map(|(l, r)| warning(l, r)).collect();
-        Ok(Product { files, result: json!(report), warnings, ..Product::default() })
+        Ok(Product { files, result: plain(&report)?, warnings, ..Product::default() })
     })
 }
 

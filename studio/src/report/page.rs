@@ -140,8 +140,9 @@ h1 { margin: 0; font-size: 2rem; font-weight: 650; }
 header p, .lead, figcaption { color: var(--soft); margin: .25rem 0 0; }
 h2 { margin: 2.5rem 0 .25rem; font-size: 1.3rem; }
 h3 { margin: 1.5rem 0 .25rem; font-size: 1.05rem; }
-.row { display: flex; flex-wrap: wrap; gap: .75rem; margin: .75rem 0; }
-figure { margin: 0; flex: 0 1 auto; }
+.row { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(15.5rem, 45%), 1fr)); gap: .75rem;
+  margin: .75rem 0; }
+figure { margin: 0; max-width: 300px; }
 img { display: block; max-width: 100%; height: auto; border-radius: 8px; border: 1px solid var(--line); }
 figcaption { font-size: .85rem; }
 .scroll { overflow-x: auto; }

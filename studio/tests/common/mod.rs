@@ -1,6 +1,6 @@
 //! What the black-box tests share.
 
-#![allow(dead_code)] // each test file uses its own part
+#![allow(dead_code, clippy::unwrap_used)] // each test file uses its own part; all of it is test code
 
 use std::{
     fs,
@@ -29,40 +29,42 @@ pub fn exits(code: i32, command: &mut Command) -> Value {
     serde_json::from_str(&out).unwrap_or_else(|e| panic!("{e}: {out}"))
 }
 
-const WIDTH: u32 = 64;
-const HEIGHT: u32 = 48;
-
 /// A small folder recording, and a subject folder beside it that does not exist yet.
 pub struct Recording {
     dir: tempfile::TempDir,
+    width: u32,
+    height: u32,
 }
 
 impl Recording {
     /// `depth` depth and `color` colour images of a slope.
     pub fn new(depth: usize, color: usize) -> Self {
-        Self::made(depth, color, |_, u, v| (1000 + u + v) as u16)
+        Self::made([64, 48], depth, color, |_, u, v| (1000 + u + v) as u16)
     }
 
-    /// Frames that do not compress.
+    /// Frames that do not compress: about 0.6 MB each.
     pub fn with_noise(frames: usize) -> Self {
-        Self::made(frames, frames, |i, u, v| {
-            let seed = (i as u32 * 7919 + v * 1009 + u).wrapping_mul(2_654_435_761);
-            (500 + (seed >> 16) % 8000) as u16
+        Self::made([640, 480], frames, frames, |i, u, v| {
+            let mut seed = (i as u32 * 7919 + v * 1009 + u).wrapping_mul(2_654_435_761);
+            for shift in [15, 13, 16] {
+                seed = (seed ^ (seed >> shift)).wrapping_mul(2_246_822_519);
+            }
+            (500 + (seed >> 8) % 8000) as u16
         })
     }
 
-    fn made(depth: usize, color: usize, value: impl Fn(usize, u32, u32) -> u16) -> Self {
-        let recording = Self { dir: tempfile::tempdir().unwrap() };
+    fn made([width, height]: [u32; 2], depth: usize, color: usize, value: impl Fn(usize, u32, u32) -> u16) -> Self {
+        let recording = Self { dir: tempfile::tempdir().unwrap(), width, height };
         let folder = recording.folder();
         for name in ["depth", "color"] {
             fs::create_dir_all(folder.join(name)).unwrap();
         }
         for i in 0..depth {
-            let image = ImageBuffer::from_fn(WIDTH, HEIGHT, |u, v| Luma([value(i, u, v)]));
+            let image = ImageBuffer::from_fn(width, height, |u, v| Luma([value(i, u, v)]));
             image.save(folder.join(format!("depth/{i:06}.png"))).unwrap();
         }
         for i in 0..color {
-            let image = ImageBuffer::from_fn(WIDTH, HEIGHT, |u, v| Rgb([u as u8, v as u8, i as u8]));
+            let image = ImageBuffer::from_fn(width, height, |u, v| Rgb([u as u8, v as u8, i as u8]));
             image.save(folder.join(format!("color/{i:06}.png"))).unwrap();
         }
         if depth > 0 {
@@ -75,7 +77,7 @@ impl Recording {
 
     fn camera(&self) -> Value {
         serde_json::json!({
-            "width": WIDTH, "height": HEIGHT, "fx": 60.0, "fy": 60.0, "cx": 32.0, "cy": 24.0,
+            "width": self.width, "height": self.height, "fx": 60.0, "fy": 60.0, "cx": 32.0, "cy": 24.0,
             "depth_scale": 0.001, "fps": 30.0, "distortion": [0, 0, 0, 0, 0]
         })
     }
@@ -117,4 +119,20 @@ impl Recording {
         let count = |p: &Path| fs::read_dir(p).map_or(0, Iterator::count);
         count(&self.subject().join("takes")) == 0
     }
+}
+
+/// A copy of a subject's recordings, without what was built.
+pub fn copy_takes(from: &Path, to: &Path) {
+    fs::create_dir_all(to.join("takes")).unwrap();
+    fs::copy(from.join("subject.toml"), to.join("subject.toml")).unwrap();
+    for take in fs::read_dir(from.join("takes")).unwrap().flatten() {
+        fs::copy(take.path(), to.join("takes").join(take.file_name())).unwrap();
+    }
+}
+
+/// Every file below a folder whose name ends so.
+pub fn files_ending(folder: &Path, end: &str) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let inside = |path: PathBuf| if path.is_dir() { files_ending(&path, end) } else { vec![path] };
+    entries.flatten().flat_map(|e| inside(e.path())).filter(|p| p.to_string_lossy().ends_with(end)).collect()
 }

@@ -1,0 +1,135 @@
+//! Takes that are no good session: what is said, the exit code, and what is on disk afterwards.
+
+#![allow(clippy::unwrap_used)] // all of it is test code
+
+mod common;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::OnceLock,
+};
+
+use common::{Recording, copy_takes, exits, files_ending, toile};
+
+/// A synthetic subject with a body and a trousers take of few frames, made once.
+fn olga() -> &'static Path {
+    static MADE: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
+    let make = || {
+        let dir = tempfile::tempdir().unwrap();
+        let subject = dir.path().join("olga");
+        let words = ["--garments", "trousers", "--frames", "60", "--seed", "5"];
+        exits(0, toile().arg("synthesize").arg("--out").arg(&subject).args(words));
+        (dir, subject)
+    };
+    &MADE.get_or_init(make).1
+}
+
+fn copy_of_olga() -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let subject = dir.path().join("olga");
+    copy_takes(olga(), &subject);
+    (dir, subject)
+}
+
+/// Leaves the subject only its body take.
+fn drop_trousers(subject: &Path) {
+    fs::remove_file(subject.join("takes/01-trousers.mcap")).unwrap();
+    let toml = fs::read_to_string(subject.join("subject.toml")).unwrap();
+    let body = toml.split("[[layers]]").take(2).collect::<Vec<_>>().join("[[layers]]");
+    fs::write(subject.join("subject.toml"), body).unwrap();
+}
+
+#[test]
+fn a_take_with_nobody_in_it() {
+    let recording = Recording::new(12, 12);
+    exits(0, toile().args(recording.import("body")));
+    let answer = exits(1, toile().arg("process").arg(recording.subject()));
+    let message = answer["failures"][0].as_str().unwrap();
+    assert!(message.contains("takes/00-body.mcap") && message.contains("nobody"), "{message}");
+    assert!(files_ending(&recording.subject().join("build"), "scan.ply").is_empty());
+}
+
+#[test]
+fn a_turn_that_is_not_full_is_a_warning() {
+    let dir = tempfile::tempdir().unwrap();
+    let subject = dir.path().join("half");
+    let words = ["--garments", "", "--frames", "36", "--degrees", "220", "--seed", "6"];
+    exits(0, toile().arg("synthesize").arg("--out").arg(&subject).args(words));
+    let answer = exits(0, toile().arg("fuse").arg(&subject));
+    let warnings = answer["warnings"].to_string();
+    assert!(warnings.contains("00-body") && warnings.contains("no full turn"), "{answer}");
+    assert!(subject.join("build/00-body/scan.ply").is_file());
+}
+
+#[test]
+fn a_garment_take_that_shows_no_new_garment() {
+    let (_dir, subject) = copy_of_olga();
+    // The trousers take shows the body once more.
+    fs::copy(subject.join("takes/00-body.mcap"), subject.join("takes/01-trousers.mcap")).unwrap();
+    let answer = exits(1, toile().arg("process").arg(&subject));
+    let message = answer["failures"].to_string();
+    assert!(message.contains("takes/01-trousers.mcap") && message.contains("no new garment"), "{answer}");
+    assert!(message.contains("--retake"), "{message}");
+    assert_eq!(answer["results"][0]["layers"], serde_json::json!(["body"]), "the avatar is made of what there is");
+    assert!(subject.join("avatar.glb").is_file() && !subject.join("build/01-trousers/garment.ply").exists());
+    let page = fs::read_to_string(subject.join("report.html")).unwrap();
+    assert!(page.contains("no new garment"), "the report says so too");
+}
+
+#[test]
+fn a_full_disk_while_processing_leaves_no_half_file_and_the_next_run_goes_on() {
+    let (_dir, subject) = copy_of_olga();
+    drop_trousers(&subject);
+    let mut limited = Command::new("sh");
+    let words =
+        format!("ulimit -f 600; trap '' XFSZ; exec {} fuse {} --json", env!("CARGO_BIN_EXE_toile"), subject.display());
+    let answer = exits(1, limited.arg("-c").arg(words));
+    let message = answer["error"]["message"].as_str().unwrap();
+    assert!(message.contains("scan.ply") && message.contains("free some space"), "{message}");
+    assert!(files_ending(&subject.join("build"), "scan.ply").is_empty());
+    assert!(files_ending(&subject, ".part").is_empty());
+    exits(0, toile().arg("fuse").arg(&subject));
+    assert!(subject.join("build/00-body/scan.ply").is_file());
+}
+
+#[test]
+fn a_take_torn_by_a_power_cut_is_used_as_far_as_it_goes_and_exits_with_3() {
+    let (_dir, subject) = copy_of_olga();
+    drop_trousers(&subject);
+    let take = subject.join("takes/00-body.mcap");
+    let plain = subject.join("plain.mcap");
+    // In the plain encoding the recording has several chunks.
+    exits(0, toile().arg("export").arg(&take).arg("--mcap").arg(&plain));
+    let bytes = fs::read(&plain).unwrap();
+    fs::write(&take, &bytes[..bytes.len() * 9 / 10]).unwrap();
+    fs::remove_file(&plain).unwrap();
+    let answer = exits(3, toile().arg("fuse").arg(&subject));
+    let lost = answer["lost"].to_string();
+    assert!(lost.contains("00-body.mcap") && lost.contains("frames were read"), "{answer}");
+    let again = exits(3, toile().arg("fuse").arg(&subject));
+    assert_eq!(again["lost"], answer["lost"], "a skipped stage still says what is lost");
+}
+
+#[test]
+fn a_failed_subject_does_not_stop_the_next() {
+    let (_dir, subject) = copy_of_olga();
+    drop_trousers(&subject);
+    let empty = Recording::new(12, 12);
+    exits(0, toile().args(empty.import("body")));
+    let answer = exits(1, toile().arg("process").arg(empty.subject()).arg(&subject));
+    let outcomes: Vec<_> = answer["results"].as_array().unwrap().iter().map(|r| r["outcome"].clone()).collect();
+    assert_eq!(outcomes, ["failed", "done"]);
+    assert!(subject.join("avatar.glb").is_file());
+}
+
+#[test]
+fn a_subject_without_takes_says_how_to_get_one() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("subject.toml"), "name = \"nobody\"\n").unwrap();
+    let message = exits(1, toile().arg("process").arg(dir.path()))["failures"].to_string();
+    assert!(message.contains("toile import"), "{message}");
+    let message = exits(1, toile().arg("process").arg(dir.path().join("takes")))["failures"].to_string();
+    assert!(message.contains("takes"), "{message}");
+}
