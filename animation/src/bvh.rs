@@ -121,11 +121,11 @@ pub fn read(path: &Path) -> Result<Bvh, AnimationError> {
     parse(&String::from_utf8_lossy(&bytes), &path.display().to_string())
 }
 
-/// The text of a BVH file, numbers with six decimals: reading it gives the motion back to that precision.
+/// The text of a BVH file; offsets and channels with six decimals.
 pub fn write(bvh: &Bvh) -> String {
     let mut out = String::from("HIERARCHY\n");
     write_joint(bvh, 0, 0, &mut out);
-    out.push_str(&format!("MOTION\nFrames: {}\nFrame Time: {}\n", bvh.frames.len(), number(bvh.frame_time)));
+    out.push_str(&format!("MOTION\nFrames: {}\nFrame Time: {}\n", bvh.frames.len(), bvh.frame_time));
     for frame in &bvh.frames {
         let row: Vec<String> = frame.iter().map(|v| number(*v)).collect();
         out.push_str(&row.join(" "));

@@ -3,28 +3,39 @@
 use nalgebra::Vector3;
 use toile_character::{Joint, Pose, Skeleton};
 
-const FOOT_JOINTS: [Joint; 4] = [Joint::LeftFoot, Joint::LeftToes, Joint::RightFoot, Joint::RightToes];
+use crate::feet::foot_height;
 
-/// Share of the poses that may have a foot below the floor when the floor is chosen: single bad frames of a
-/// capture do not lift the whole motion.
-const BELOW_FLOOR_SHARE: f64 = 0.02;
-
-/// Moves the whole motion so that the lowest feet stand on the floor (their joints at rest height) and the hips
-/// start above the origin. Where the source's hips never rise or sink, which hand-keyed cycles do, each pose is
-/// set on the floor by itself.
+/// Moves the whole motion so that standing feet stand on the floor and the hips start above the origin. Where the
+/// source's hips never rise or sink, which hand-keyed cycles do, each pose is set on the floor by itself.
 pub(crate) fn place(target: &Skeleton, poses: &mut [Pose]) {
     const FIXED_HEIGHT: f64 = 1e-4; // metres
-    let heights: Vec<f64> = poses.iter().map(|p| foot_height(target, p)).collect();
+    let heights: Vec<f64> = poses.iter().map(|p| lowest_foot(target, p).1).collect();
     let hips = |p: &Pose| target.position(Joint::Hips).y + p.translation.y;
     let (low, high) = poses.iter().map(hips).fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
     let start = poses.first().map_or_else(Vector3::zeros, |p| p.translation + target.position(Joint::Hips).coords);
-    let mut sorted = heights.clone();
-    sorted.sort_by(f64::total_cmp);
-    let floor = sorted.get((sorted.len() as f64 * BELOW_FLOOR_SHARE) as usize).copied().unwrap_or(0.0);
+    let floor = floor_height(target, poses);
     let fixed = poses.len() > 1 && high - low < FIXED_HEIGHT;
     for (pose, height) in poses.iter_mut().zip(heights) {
         pose.translation -= Vector3::new(start.x, if fixed { height } else { floor }, start.z);
     }
+}
+
+/// The height that feet stand at: of the poses in which the ankle of the lower foot is slowest, the median. Feet
+/// that roll over heel or ball are in motion, and so are feet in the air.
+fn floor_height(target: &Skeleton, poses: &[Pose]) -> f64 {
+    const STANDING_SHARE: f64 = 0.3;
+    let ankle = |p: &Pose, foot: Joint| p.joint_frames(target)[foot.index()].translation.vector;
+    let mut standing: Vec<(f64, f64)> = Vec::with_capacity(poses.len());
+    for (i, pose) in poses.iter().enumerate() {
+        let (foot, height) = lowest_foot(target, pose);
+        let other = &poses[if i + 1 < poses.len() { i + 1 } else { i.saturating_sub(1) }];
+        standing.push(((ankle(pose, foot) - ankle(other, foot)).norm(), height));
+    }
+    standing.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let count = ((standing.len() as f64 * STANDING_SHARE).ceil() as usize).min(standing.len());
+    let mut heights: Vec<f64> = standing[..count].iter().map(|s| s.1).collect();
+    heights.sort_by(f64::total_cmp);
+    heights.get(heights.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Takes the travel over the ground out: the path of the hips, smoothed over about a step, stays at the origin.
@@ -41,16 +52,17 @@ pub(crate) fn keep_in_place(target: &Skeleton, poses: &mut [Pose], frame_time: f
     }
 }
 
-/// 98th percentile of how far the lowest foot joint is below its height at rest, metres; 0 where none is.
+/// 98th percentile of how far the lowest foot is below the floor, metres; 0 where none is.
 pub(crate) fn depth_below_floor(target: &Skeleton, poses: &[Pose]) -> f64 {
-    let mut heights: Vec<f64> = poses.iter().map(|p| foot_height(target, p)).collect();
+    let mut heights: Vec<f64> = poses.iter().map(|p| lowest_foot(target, p).1).collect();
     heights.sort_by(f64::total_cmp);
     let at = (heights.len() as f64 * 0.02) as usize;
     heights.get(at).map_or(0.0, |h| (-h).max(0.0))
 }
 
-/// Height of the lowest foot joint above where it is at rest.
-fn foot_height(target: &Skeleton, pose: &Pose) -> f64 {
-    let frames = pose.joint_frames(target);
-    FOOT_JOINTS.iter().map(|j| frames[j.index()].translation.vector.y - target.position(*j).y).fold(f64::MAX, f64::min)
+/// The lower foot and the height of its sole above the floor.
+fn lowest_foot(target: &Skeleton, pose: &Pose) -> (Joint, f64) {
+    let left = foot_height(target, pose, Joint::LeftFoot, Joint::LeftToes);
+    let right = foot_height(target, pose, Joint::RightFoot, Joint::RightToes);
+    if left <= right { (Joint::LeftFoot, left) } else { (Joint::RightFoot, right) }
 }

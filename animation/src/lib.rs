@@ -5,12 +5,24 @@
 //! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
 //! - [`resample`], [`close_loop`]: other rates, endless motions;
 //!
+//! ```
+//! use toile_animation::{RetargetSettings, retarget, shipped_walk};
+//! use toile_character::BodyModel;
+//!
+//! let model = BodyModel::load_default()?;
+//! let person = model.skeleton_at(&vec![0.0; model.component_count()]);
+//! let result = retarget(&shipped_walk()?, "walk", &person, &RetargetSettings::default())?;
+//! assert_eq!(result.motion.poses.len(), 129);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Poses are relative to the A-pose rest of the person; +Y up, +Z the front; metres, radians, seconds.
 
 pub mod bvh;
 mod bvh_read;
 mod direction;
 pub mod error;
+mod feet;
 mod gait;
 mod ground;
 mod joint_names;

@@ -4,17 +4,20 @@ use toile_character::{Motion, Pose};
 
 use crate::retarget::shortest;
 
+/// Frame times in files are rounded (0.0333 s for 30 Hz): rates that differ by less than this share are the same,
+/// and a last pose that is missed by less than this share of a step is taken.
+const ROUNDING: f64 = 5e-3;
+
 /// The motion with at most `max_rate` poses a second; a slower one is returned as it is.
 ///
 /// Poses between frames are interpolated (translations on a line, rotations the short way). The last pose is the
 /// last whole step at or before the source's end.
 pub fn resample(motion: &Motion, max_rate: f64) -> Motion {
-    // rates that differ by rounding alone (0.0333333 s against 30 Hz) are the same rate
-    if motion.poses.len() < 2 || motion.frame_time * max_rate > 1.0 - 1e-3 {
+    if motion.poses.len() < 2 || motion.frame_time * max_rate > 1.0 - ROUNDING {
         return motion.clone();
     }
     let frame_time = 1.0 / max_rate;
-    let count = (motion.duration() / frame_time + 1e-6).floor() as usize + 1;
+    let count = (motion.duration() / frame_time + ROUNDING).floor() as usize + 1;
     let poses = (0..count).map(|i| pose_at(motion, i as f64 * frame_time)).collect();
     Motion { name: motion.name.clone(), frame_time, poses }
 }

@@ -1,7 +1,7 @@
 //! A motion file carried onto the skeleton of one person.
 //!
-//! Limbs of the result point where the source's limbs point, exactly and in every frame; twist comes from the
-//! source's joints; trunk and head turn as the source's do. The hips go the source's way scaled by leg length, so
+//! Limbs of the result point where the source's limbs point, in every frame and exactly unless a foot has to be lifted
+//! out of the floor; twist comes from the source's joints; trunk and head turn as the source's do. The hips go the source's way scaled by leg length, so
 //! that feet land instead of sliding, and the whole is set on the floor facing +Z.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -12,6 +12,7 @@ use crate::{
     AnimationError,
     bvh::Bvh,
     direction::{align, swing, unit_or},
+    feet::lift_out_of_floor,
     ground,
     looping::close_loop,
     reference::{Reference, bone, find_reference},
@@ -33,11 +34,13 @@ pub struct RetargetSettings {
     pub looped: bool,
     /// Turn finger joints where the source has them. Default true.
     pub fingers: bool,
+    /// Lift feet that would dip below the floor, by bending the knee. Default true.
+    pub lift_feet: bool,
 }
 
 impl Default for RetargetSettings {
     fn default() -> Self {
-        Self { max_rate: 30.0, face_front: true, in_place: false, looped: false, fingers: true }
+        Self { max_rate: 30.0, face_front: true, in_place: false, looped: false, fingers: true, lift_feet: true }
     }
 }
 
@@ -65,7 +68,7 @@ pub struct RetargetReport {
     pub joints: Vec<(Joint, String)>,
     /// Poses in the result.
     pub poses: usize,
-    /// Depth of the lowest foot joint below its height at rest, 98th percentile over the poses, metres.
+    /// Depth of the lower foot's sole below the floor, 98th percentile over the poses, metres.
     pub foot_below_floor: f64,
 }
 
@@ -96,6 +99,9 @@ pub fn retarget(
         })
         .collect();
     ground::place(target, &mut poses);
+    if settings.lift_feet {
+        lift_out_of_floor(target, &mut poses);
+    }
     if settings.in_place || settings.looped {
         ground::keep_in_place(target, &mut poses, bvh.frame_time);
     }

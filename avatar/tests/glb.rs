@@ -1,4 +1,5 @@
 //! GLB files read back with another reader (the `gltf` crate).
+#![allow(clippy::unwrap_used)] // helpers of tests are not seen as tests
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! VRM 1.0 files: bones, rest, terms of use.
+#![allow(clippy::unwrap_used)] // helpers of tests are not seen as tests
 
 mod common;
 
