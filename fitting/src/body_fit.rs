@@ -10,6 +10,7 @@ use crate::{
     cloud::{Cloud, Samples},
     conform::{Conformed, conform},
     correspond::Gate,
+    fingers::fit_fingers,
     level::{Level, LevelResult, body_joints},
     measure::{Measurements, measure, stature},
     prepare::{Prepared, prepare},
@@ -158,6 +159,7 @@ fn refine(
     let fine = Resolution { cell: 0.006, body_cell: 0.010, components: settings.components, iterations, gate };
     let mut last = fine.run(model, scan, trust, settings, first.state)?;
     last.iterations += first.iterations;
+    last.state = fit_fingers(model, scan, trust, settings, last.state)?;
     Ok(last)
 }
 
@@ -196,6 +198,7 @@ impl Resolution {
             columns,
             iterations: self.iterations,
             shape_sigma: settings.shape_sigma,
+            rooted: false,
         };
         level.run(state, &JointPrior::standing(&model.mean_skeleton))
     }

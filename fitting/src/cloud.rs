@@ -103,6 +103,11 @@ impl Cloud {
         let near = self.tree.query(&query).nearest_n::<SquaredEuclidean<f32>>(CANDIDATES).execute();
         near.iter().filter(|n| n.distance <= limit).map(|n| n.item).find(|&i| fits(i))
     }
+
+    /// Distance to the nearest sample, metres.
+    pub fn distance(&self, p: &Point3<f32>) -> f32 {
+        self.tree.query(&[p.x, p.y, p.z]).nearest_one::<SquaredEuclidean<f32>>().execute().distance.sqrt()
+    }
 }
 
 pub(crate) fn key(p: &Point3<f32>, n: &Vector3<f32>, cell: f32) -> [i32; 4] {

@@ -59,7 +59,9 @@ pub(crate) fn conform(
         let pulls: Vec<Pull> = (0..points.len())
             .into_par_iter()
             .with_min_len(128)
-            .map(|v| surface.pull(&points[v], &normals[v], freedom[v]))
+            .map(|v| {
+                surface.pull(&points[v], &normals[v], freedom[v], min_cos(model.regions[v], &settings.conformation))
+            })
             .collect();
         points = elastic.solve(&start, &pulls)?;
         release_folds(model, &start, &points, &mut freedom);
@@ -72,11 +74,15 @@ fn freedom(model: &BodyModel) -> Vec<f64> {
     let of = |v: usize| match model.regions[v] {
         _ if model.inner[v] => 0.0,
         Region::LeftHand | Region::RightHand => 0.1,
-        Region::LeftFoot | Region::RightFoot => 0.5,
-        Region::Head => 0.5,
         _ => 1.0,
     };
     (0..model.mean.len()).map(of).collect()
+}
+
+/// Lips and toes are folded finer than a scan shows: there the scan's normal may differ more.
+fn min_cos(region: Region, settings: &ConformSettings) -> f32 {
+    let folded = matches!(region, Region::Head | Region::LeftFoot | Region::RightFoot);
+    (if folded { 0.5 * settings.min_cos } else { settings.min_cos }) as f32
 }
 
 struct Surface<'a> {
@@ -93,12 +99,11 @@ struct Pull {
 }
 
 impl Surface<'_> {
-    fn pull(&self, p: &Point3<f32>, n: &Vector3<f32>, freedom: f64) -> Pull {
+    fn pull(&self, p: &Point3<f32>, n: &Vector3<f32>, freedom: f64, min_cos: f32) -> Pull {
         let none = Pull { target: *p, weight: 0.0 };
         if freedom == 0.0 {
             return none;
         }
-        let min_cos = self.settings.min_cos as f32;
         let fits = |t: u32| self.normal(t).dot(n) > min_cos;
         let Some(hit) = self.bvh.closest_where(p, self.settings.reach as f32, fits) else { return none };
         let tri = self.scan.triangles[hit.triangle as usize];

@@ -26,6 +26,8 @@ pub(crate) struct Level<'a> {
     pub columns: Columns,
     pub iterations: usize,
     pub shape_sigma: f64,
+    /// The translation stays as it is: only joints turn.
+    pub rooted: bool,
 }
 
 /// Where a level ended.
@@ -63,6 +65,9 @@ impl Level<'_> {
         let mut equations = NormalEquations::sum(&found.residuals, self.body, posed, &self.columns);
         prior.add(&mut equations, state, posed, &self.columns);
         add_shape_prior(&mut equations, state, &self.columns, self.shape_sigma);
+        if self.rooted {
+            (0..3).for_each(|axis| equations.add_single(axis, 0.0, 1e-7));
+        }
         let delta = equations.step(1e-4).ok_or(FittingError::Singular { what: "the pose" })?;
         Ok(clamped(delta.as_slice(), &self.columns))
     }

@@ -14,6 +14,7 @@ mod conform;
 mod correspond;
 mod equations;
 mod error;
+mod fingers;
 mod level;
 pub mod measure;
 mod prepare;

@@ -56,6 +56,7 @@ pub(crate) fn starts(
         columns: Columns::new(main_joints(), COARSE_COMPONENTS),
         iterations: 10,
         shape_sigma: 1.0,
+        rooted: false,
     };
     let candidates = candidates(model, scan, &level, ups, headings);
     let prior = JointPrior::standing(&model.mean_skeleton);

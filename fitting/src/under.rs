@@ -105,7 +105,7 @@ fn check(dressed: &SkinnedMesh, trust: &[f32], scan: &Mesh, settings: &UnderSett
         return Err(FittingError::Scan("it has no triangles; scan the take again".into()));
     }
     let positive = [settings.joint_sigma, settings.cloth, settings.stand_off, settings.inside_sigma];
-    if positive.iter().any(|s| !(*s > 0.0)) {
+    if !positive.iter().all(|s| *s > 0.0) {
         let reason = "joint_sigma, cloth, stand_off and inside_sigma must be above 0".into();
         return Err(FittingError::Setting { name: "joint_sigma", reason });
     }
