@@ -50,6 +50,7 @@ pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
         ],
         settings: json!({ "extract": plain(&settings)?, "type": told }),
         outputs: vec![folders.cut(layer), folders.unstacked(layer)],
+        outputs_vary: false,
     };
     stage.run(&run.label(layer, "cut"), run.progress, |progress| {
         let [(scan, pose), (scan_before, pose_before)] = &paths;

@@ -39,6 +39,7 @@ pub fn run(run: &Run, body: &Body, bvh: Option<&Path>) -> Result<Record, StudioE
         inputs,
         settings: json!({ "name": run.title(), "types": types, "retarget": motion::settings(), "vrm": VrmMeta::default() }),
         outputs: vec![folders.glb(), folders.vrm()],
+        outputs_vary: false,
     };
     stage.run(&run.label("avatar", "export"), run.progress, |progress| {
         let moved = motion::load(bvh, &body.skinned.skeleton)?;

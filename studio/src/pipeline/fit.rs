@@ -62,6 +62,7 @@ pub fn fit(run: &Run, place: &Place, model: &BodyModel) -> Result<Record, Studio
         inputs: vec![place.scan.clone()],
         settings: plain(&settings)?,
         outputs: names.iter().map(|n| at(n)).chain([place.pose.clone()]).collect(),
+        outputs_vary: false,
     };
     stage.run(&run.label("body", "fit"), run.progress, |progress| {
         let scan = run.read_mesh(&place.scan)?;

@@ -47,6 +47,7 @@ pub fn fuse_recording(
         inputs: files_of(recording)?,
         settings: plain(settings)?,
         outputs: outputs.clone(),
+        outputs_vary: false,
     };
     stage.run(&run.label(name, "fuse"), run.progress, |progress| {
         let opened = Opened::new(recording, None)?;

@@ -47,6 +47,7 @@ pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Res
         inputs,
         settings: said,
         outputs: vec![folders.report()],
+        outputs_vary: true,
     };
     stage.run(&run.label("report", "draw"), run.progress, |progress| {
         let contents = contents(run, body, bvh, summary)?;

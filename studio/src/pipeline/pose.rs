@@ -43,6 +43,7 @@ pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
         ],
         settings: plain(&settings)?,
         outputs: vec![pose_path.clone(), body_path.clone()],
+        outputs_vary: false,
     };
     stage.run(&run.label(layer, "pose"), run.progress, |progress| {
         let (scan, scan_before) = (run.read_mesh(&scan_path)?, run.read_mesh(&folders.scan(before))?);

@@ -34,6 +34,7 @@ pub fn run(run: &Run) -> Result<Record, StudioError> {
         inputs,
         settings: plain(&settings)?,
         outputs: garments.iter().map(|l| folders.garment(l)).collect(),
+        outputs_vary: false,
     };
     stage.run(&run.label("layers", "stack"), run.progress, |progress| {
         let body = run.read_mesh(&folders.body_mesh())?;
