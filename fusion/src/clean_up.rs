@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Borders longer than this are closed by a surface of least area: a plate would bulge, metres.
-const PLATE_LENGTH: f32 = 0.9;
+const PLATE_LENGTH: f32 = 0.5;
 /// A hole whose border stays below this height over the disk is a sole, metres.
 const SOLE_HEIGHT: f32 = 0.03;
 /// A sole reaches the disk within this distance of its border, metres.

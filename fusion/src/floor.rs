@@ -37,8 +37,6 @@ pub struct Floor {
     pub point: Point3<f64>,
     /// Height above the plane below which points are taken for the plane itself, metres.
     pub margin: f64,
-    /// How far the disk rises over the floor around it, metres; 0 where the subject stands on the floor itself.
-    pub disk_height: f64,
 }
 
 struct Upward {
@@ -132,10 +130,8 @@ fn fit_plane(points: &[Point3<f64>]) -> Option<(Vector3<f64>, Point3<f64>)> {
 fn disk_on(pixels: &[Upward], subject: &[Point3<f32>], normal: Vector3<f64>, point: Point3<f64>) -> Floor {
     let center = footing(subject, &normal, &point);
     let across = |v: Vector3<f64>| (v - normal * v.dot(&normal)).norm();
-    let near: Vec<&Upward> = pixels
-        .iter()
-        .filter(|u| u.normal.dot(&normal) > ALIGNED && across(u.point - center) < DISK_REACH)
-        .collect();
+    let near: Vec<&Upward> =
+        pixels.iter().filter(|u| u.normal.dot(&normal) > ALIGNED && across(u.point - center) < DISK_REACH).collect();
     let heights: Vec<f64> = near.iter().map(|u| (u.point - point).dot(&normal)).collect();
     let (mut n, mut on) = (normal, point + normal * highest_level(&heights));
     let mut offsets = Vec::new();
@@ -147,8 +143,7 @@ fn disk_on(pixels: &[Upward], subject: &[Point3<f32>], normal: Vector3<f64>, poi
     }
     offsets.sort_unstable_by(f64::total_cmp);
     let sigma = 1.4826 * offsets.get(offsets.len() / 2).copied().unwrap_or(0.003);
-    let rise = (on - point).dot(&normal) - (on - center).dot(&normal) + (on - center).dot(&n);
-    Floor { normal: n, point: on, margin: (5.0 * sigma).clamp(0.005, 0.02), disk_height: rise.max(0.0) }
+    Floor { normal: n, point: on, margin: (5.0 * sigma).clamp(0.005, 0.02) }
 }
 
 /// Where the subject stands: the mean of its low points, or of all where none is low.

@@ -35,15 +35,16 @@ struct Pixel {
 /// The voxel grid seen from the camera.
 struct Projection<'a> {
     /// Columns and rows of the image.
-    size: [f32; 2],
+    size: [u32; 2],
     /// Depth by pixel, 0 where there is nothing to fuse, and one more 0 for points outside the image.
     depth: &'a [f32],
+    /// One more than there are pixels, as `depth`.
     pixels: &'a [Pixel],
     colors: &'a [[u8; 3]],
     /// Camera coordinates of a voxel step along each axis, and of voxel 0.
     axes: [[f32; 3]; 3],
     origin: [f32; 3],
-    /// Pixel coordinates times depth from camera coordinates: fx, cx + ½, fy, cy + ½.
+    /// Focal length and principal point of columns and of rows.
     lens: [f32; 4],
     truncation: f32,
     unit: f32,
@@ -56,9 +57,10 @@ struct Projection<'a> {
 /// # Errors
 /// [`FusionError::TooLarge`] where the block index would not fit.
 pub fn integrate(tsdf: &mut Tsdf, view: &View, scan_from_camera: &Rigid) -> Result<Touched, FusionError> {
-    let pixels = surface_elements(view);
+    let mut pixels = surface_elements(view);
     let mut depth: Vec<f32> = pixels.iter().map(|p| if p.weight > 0.0 { p.depth } else { 0.0 }).collect();
     depth.push(0.0);
+    pixels.push(Pixel::default());
     let touched = touch_blocks(tsdf, view, scan_from_camera)?;
     let count = touched.iter().filter(|t| **t).count();
     let colors = if tsdf.has_color() { view.colors.as_slice() } else { &[] };
@@ -160,13 +162,13 @@ impl<'a> Projection<'a> {
         let rotation = camera_from_scan.rotation.to_rotation_matrix();
         let (size, camera) = (tsdf.voxel_size(), &view.camera);
         Self {
-            size: [camera.width as f32, camera.height as f32],
+            size: [camera.width, camera.height],
             depth,
             pixels,
             colors,
             axes: std::array::from_fn(|k| std::array::from_fn(|r| rotation[(r, k)] as f32 * size)),
             origin: std::array::from_fn(|r| camera_from_scan.translation.vector[r] as f32),
-            lens: [camera.fx as f32, camera.cx as f32 + 0.5, camera.fy as f32, camera.cy as f32 + 0.5],
+            lens: [camera.fx as f32, camera.cx as f32, camera.fy as f32, camera.cy as f32],
             truncation: tsdf.truncation(),
             unit: tsdf.unit(),
         }
@@ -200,26 +202,26 @@ impl<'a> Projection<'a> {
     /// is not hidden.
     #[inline]
     fn look_up(&self, start: [f32; 3]) -> ([u32; SIDE], [f32; SIDE], bool) {
-        let outside = (self.depth.len() - 1) as u32;
         let step = self.axes[0];
         let [fx, cx, fy, cy] = self.lens;
-        let (mut index, mut range) = ([outside; SIDE], [0.0; SIDE]);
-        let (mut us, mut vs) = ([0.0f32; SIDE], [0.0f32; SIDE]);
+        let mut range = [0.0f32; SIDE];
+        let (mut columns, mut rows) = ([0i32; SIDE], [0i32; SIDE]);
         for x in 0..SIDE {
-            let k = x as f32;
-            let z = start[2] + step[2] * k;
+            let z = start[2] + step[2] * STEPS[x];
             let inv = 1.0 / z;
             range[x] = z;
-            us[x] = fx * (start[0] + step[0] * k) * inv + cx;
-            vs[x] = fy * (start[1] + step[1] * k) * inv + cy;
+            columns[x] = rounded(fx * (start[0] + step[0] * STEPS[x]) * inv + cx);
+            rows[x] = rounded(fy * (start[1] + step[1] * STEPS[x]) * inv + cy);
         }
+        let outside = (self.depth.len() - 1) as u32;
+        let mut index = [outside; SIDE];
         let mut any = false;
         for x in 0..SIDE {
-            let (u, v) = (us[x], vs[x]);
-            if u >= 0.0 && v >= 0.0 && u < self.size[0] && v < self.size[1] && range[x] > 0.05 {
-                index[x] = v as u32 * self.size[0] as u32 + u as u32;
+            let (u, v) = (columns[x] as u32, rows[x] as u32);
+            if (u < self.size[0]) & (v < self.size[1]) & (range[x] > 0.05) {
+                index[x] = v * self.size[0] + u;
                 let depth = self.depth[index[x] as usize];
-                any |= depth > 0.0 && range[x] - depth <= self.truncation;
+                any |= (depth > 0.0) & (range[x] - depth <= self.truncation);
             }
         }
         (index, range, any)
@@ -231,26 +233,33 @@ impl<'a> Projection<'a> {
     fn measure(&self, start: [f32; 3], index: &[u32; SIDE], range: &[f32; SIDE]) -> ([f32; SIDE], [f32; SIDE]) {
         let mut planes = [[0.0f32; SIDE]; 6];
         for x in 0..SIDE {
-            let pixel = &self.pixels[(index[x] as usize).min(self.pixels.len() - 1)];
-            let plane = [pixel.normal[0], pixel.normal[1], pixel.normal[2], pixel.offset, pixel.weight, pixel.depth];
-            (0..6).for_each(|k| planes[k][x] = plane[k]);
+            let pixel = &self.pixels[index[x] as usize];
+            planes[0][x] = pixel.normal[0];
+            planes[1][x] = pixel.normal[1];
+            planes[2][x] = pixel.normal[2];
+            planes[3][x] = pixel.offset;
+            planes[4][x] = pixel.weight;
+            planes[5][x] = pixel.depth;
         }
         let (t, step, scale) = (self.truncation, self.axes[0], 1.0 / self.unit);
-        let outside = (self.depth.len() - 1) as u32;
         let (mut distance, mut weight) = ([0.0; SIDE], [0.0; SIDE]);
         for x in 0..SIDE {
-            let k = x as f32;
-            let p = [start[0] + step[0] * k, start[1] + step[1] * k, start[2] + step[2] * k];
-            let to_plane = planes[0][x] * p[0] + planes[1][x] * p[1] + planes[2][x] * p[2] - planes[3][x];
+            let k = STEPS[x];
+            let across = planes[0][x] * (start[0] + step[0] * k) + planes[1][x] * (start[1] + step[1] * k);
+            let to_plane = across + planes[2][x] * (start[2] + step[2] * k) - planes[3][x];
             let ahead = planes[5][x] - range[x];
-            let d = if ahead > 4.0 * t { t } else { to_plane };
-            let counts = index[x] != outside && ahead >= -t && d > -t;
-            distance[x] = d.min(t) * scale;
+            let far = if ahead > 4.0 * t { t } else { to_plane };
+            let d = if far > t { t } else { far };
+            let counts = (ahead >= -t) & (d > -t);
+            distance[x] = d * scale;
             weight[x] = if counts { planes[4][x] } else { 0.0 };
         }
         (distance, weight)
     }
 }
+
+/// Voxel steps along a row.
+const STEPS: [f32; SIDE] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 #[inline]
 fn row_of<T>(values: &mut [T; VOXELS], row: usize) -> &mut [T; SIDE] {
@@ -272,9 +281,9 @@ fn blend(sdf: &mut [i16; SIDE], weights: &mut [u16; SIDE], distance: &[f32; SIDE
     for x in 0..SIDE {
         let old = f32::from(weights[x]);
         let sum = old + weight[x];
-        let value = (f32::from(sdf[x]) * old + distance[x] * weight[x]) / sum.max(1e-6);
+        let value = (f32::from(sdf[x]) * old + distance[x] * weight[x]) / (sum + 1e-9);
         sdf[x] = rounded(value) as i16;
-        weights[x] = rounded(sum.min(65535.0)) as u16;
+        weights[x] = rounded(if sum > 65535.0 { 65535.0 } else { sum }) as u16;
     }
 }
 
@@ -285,9 +294,10 @@ fn blend_color(voxel: &mut [u16; 4], color: [u8; 3], weight: f32) {
     }
     let old = f32::from(voxel[3]);
     let sum = old + weight;
+    let share = 1.0 / sum;
     for k in 0..3 {
-        let value = (f32::from(voxel[k]) * old + f32::from(color[k]) * 256.0 * weight) / sum;
-        voxel[k] = (value + 0.5) as u16;
+        let value = (f32::from(voxel[k]) * old + f32::from(color[k]) * 256.0 * weight) * share;
+        voxel[k] = rounded(value) as u16;
     }
-    voxel[3] = (sum + 0.5).min(f32::from(u16::MAX)) as u16;
+    voxel[3] = rounded(if sum > 65535.0 { 65535.0 } else { sum }) as u16;
 }

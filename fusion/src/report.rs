@@ -24,8 +24,6 @@ pub struct VolumeReport {
     pub radius_m: f64,
     /// True where a floor or disk was found.
     pub floor_found: bool,
-    /// Height of the disk over the floor, metres.
-    pub disk_height_m: f64,
     /// Height over the disk below which nothing is fused, metres.
     pub bottom_m: f64,
     /// Distance of the axis from the camera, metres.

@@ -48,7 +48,7 @@ pub(crate) struct Scene {
 impl Scene {
     /// A small depth camera 2.3 m away at 1 m height, looking 5° down, rolled by 2°.
     pub(crate) fn new() -> Self {
-        let look = UnitQuaternion::from_euler_angles(std::f64::consts::PI + 0.087, 0.0, 0.035);
+        let look = UnitQuaternion::from_euler_angles(std::f64::consts::PI - 0.087, 0.0, 0.035);
         Self {
             camera: PinholeCamera::ideal(176, 152, 150.0, 150.0, 87.5, 76.0),
             room_from_camera: Isometry3::from_parts(Translation3::new(0.02, 1.0, 2.3), look),

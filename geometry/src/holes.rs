@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use crate::{
     Mesh, polygon,
@@ -40,32 +41,49 @@ pub fn fill_holes(mesh: &Mesh, max_length: f32, plate_length: f32) -> (Mesh, Fil
         boundary_loops(&mesh.triangles).into_iter().flat_map(split_at_repeats).filter(|l| l.len() > 2).collect();
     let taken = border_edges(mesh, &loops);
     let mut filled = Filled::default();
-    for border in &loops {
-        let length = loop_length(&mesh.positions, border);
-        if length > max_length {
-            continue;
+    let patches: Vec<Option<(Vec<u32>, Option<Patch>)>> =
+        loops.par_iter().map(|border| close(mesh, border, &taken, max_length, plate_length)).collect();
+    for (border, patch) in patches.into_iter().flatten() {
+        match patch {
+            Some(patch) => {
+                append(&mut out, &border, &patch);
+                filled.holes += 1;
+                filled.longest = filled.longest.max(loop_length(&mesh.positions, &border));
+            }
+            None => filled.left_open += 1,
         }
-        // The patch's triangles run against the border's own direction.
-        let reversed: Vec<u32> = border.iter().rev().copied().collect();
-        let points: Vec<Point3<f64>> = reversed.iter().map(|&v| mesh.positions[v as usize].cast()).collect();
-        let blocked = |i: usize, k: usize| taken.contains(&ordered(reversed[i], reversed[k]));
-        let Some(triangles) = polygon::triangulate(&points, &blocked) else {
-            filled.left_open += 1;
-            continue;
-        };
-        let mut patch = Patch::new(points, triangles);
-        patch.refine(&blocked);
-        if length <= plate_length {
-            relax::relax(&mut patch, mesh, &reversed);
-        }
-        append(&mut out, &reversed, &patch);
-        filled.holes += 1;
-        filled.longest = filled.longest.max(length);
     }
     if !mesh.normals.is_empty() {
         out.recompute_normals();
     }
     (out, filled)
+}
+
+/// The border in the patch's direction and its patch, if there is one; `None` where the border is too long.
+fn close(
+    mesh: &Mesh,
+    border: &[u32],
+    taken: &BTreeSet<(u32, u32)>,
+    max_length: f32,
+    plate_length: f32,
+) -> Option<(Vec<u32>, Option<Patch>)> {
+    let length = loop_length(&mesh.positions, border);
+    if length > max_length {
+        return None;
+    }
+    // The patch's triangles run against the border's own direction.
+    let reversed: Vec<u32> = border.iter().rev().copied().collect();
+    let points: Vec<Point3<f64>> = reversed.iter().map(|&v| mesh.positions[v as usize].cast()).collect();
+    let blocked = |i: usize, k: usize| taken.contains(&ordered(reversed[i], reversed[k]));
+    let patch = polygon::triangulate(&points, &blocked).map(|triangles| {
+        let mut patch = Patch::new(points, triangles);
+        patch.refine(&blocked);
+        if length <= plate_length {
+            relax::relax(&mut patch, mesh, &reversed);
+        }
+        patch
+    });
+    Some((reversed, patch))
 }
 
 /// Cuts a cycle that meets itself into simple ones.

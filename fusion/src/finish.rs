@@ -1,0 +1,240 @@
+//! The end of a take: the turn is closed, everything is fused again, the surface becomes the scan.
+
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+use toile_capture::Sensor;
+use toile_geometry::{Mesh, Rigid};
+
+use crate::{
+    FusionError, Prior, Scan, TrackedFrame,
+    clean_up::clean_up,
+    closing::close,
+    fuser::{Fuser, Kept},
+    integrate::integrate,
+    motion::{Axis, find_axis, total_turn},
+    report::{FusionReport, VolumeReport},
+    surface::extract_surface,
+    track::{register, samples},
+    tsdf::Tsdf,
+    view::{View, decode_color},
+};
+
+/// A turn of this many degrees is a full one.
+const FULL_TURN_DEG: f64 = 340.0;
+/// Most frames in the joint optimisation; of more, evenly spaced ones.
+const MOST_KEY_FRAMES: usize = 150;
+/// Frames in which a voxel must have been seen well, in weight units, to be surface.
+const LEAST_WEIGHT: u16 = 6;
+
+impl Fuser {
+    /// Closes the turn, fuses everything again and makes the scan.
+    ///
+    /// # Errors
+    /// [`FusionError::NotTracked`] where fewer than three frames were fused.
+    pub fn finish(mut self, progress: &(dyn Fn(f32) + Sync)) -> Result<Scan, FusionError> {
+        let least = if self.seen < 3 { 1 } else { 3 };
+        if self.kept.len() < least {
+            let reason = self.dropped.first().map_or_else(|| "too few frames".into(), |d| d.reason.clone());
+            return Err(FusionError::NotTracked { reason, tracked: self.kept.len(), frames: self.seen });
+        }
+        let mut report = FusionReport { settings: self.settings.clone(), ..FusionReport::default() };
+        report.settings.poses = None;
+        if self.settings.poses.is_none() {
+            self.close_turn(&mut report);
+            progress(0.3);
+            for round in 0..self.settings.refine_rounds {
+                self.refine()?;
+                progress(0.3 + 0.2 * (round + 1) as f32 / self.settings.refine_rounds as f32);
+            }
+        }
+        let field = self.fuse_again(true)?;
+        progress(0.7);
+        let raw = self.clock.time("extract", || extract_surface(&field, LEAST_WEIGHT));
+        report.triangles_raw = raw.triangles.len();
+        let placed = self.place(&raw, &mut report);
+        let mesh = raw.transformed(&placed);
+        let (settings, on_floor) = (&self.settings, self.volume.as_ref().is_some_and(|v| v.floor.is_some()));
+        let (mesh, cleaned) = self.clock.time("clean up", || clean_up(mesh, settings, on_floor));
+        report.triangles = mesh.triangles.len();
+        report.holes_filled = cleaned.holes;
+        report.filled_percent = cleaned.filled_percent;
+        report.watertight = cleaned.watertight;
+        progress(1.0);
+        Ok(self.scan(mesh, &field, &placed, report))
+    }
+
+    fn views(&self, indices: &[usize]) -> Vec<View> {
+        indices.par_iter().map(|&i| self.kept[i].depth.view(self.window)).collect()
+    }
+
+    /// Joint optimisation over key frames; frames between follow their neighbours.
+    fn close_turn(&mut self, report: &mut FusionReport) {
+        if self.settings.closing_rounds == 0 {
+            return;
+        }
+        let step = self.kept.len().div_ceil(MOST_KEY_FRAMES).max(1);
+        let keys: Vec<usize> = (0..self.kept.len()).step_by(step).collect();
+        let views = self.views(&keys);
+        let mut poses: Vec<Rigid> = keys.iter().map(|&i| self.kept[i].scan_from_camera).collect();
+        let rounds = self.settings.closing_rounds;
+        let closing = self.clock.time("close", || close(&views, &mut poses, rounds));
+        report.closing_pairs = closing.pairs;
+        report.seam_pairs = closing.seam_pairs;
+        report.seam_before_mm = closing.seam_before * 1e3;
+        report.seam_after_mm = closing.seam_after * 1e3;
+        let corrections: Vec<Rigid> =
+            keys.iter().zip(&poses).map(|(&i, pose)| pose * self.kept[i].scan_from_camera.inverse()).collect();
+        for (i, kept) in self.kept.iter_mut().enumerate() {
+            let (k, share) = (i / step, (i % step) as f64 / step as f64);
+            let next = corrections.get(k + 1).unwrap_or(&corrections[k]);
+            kept.scan_from_camera = between(&corrections[k], next, share) * kept.scan_from_camera;
+        }
+    }
+
+    /// Fuses all frames and registers each of them to the whole.
+    fn refine(&mut self) -> Result<(), FusionError> {
+        let field = self.fuse_again(false)?;
+        let (kept, window) = (&self.kept, self.window);
+        let poses: Vec<Rigid> = self.clock.time("refine", || {
+            kept.par_iter()
+                .map(|k| {
+                    let view = k.depth.view(window);
+                    let tracked = register(&field, &samples(&view, 6000), &k.scan_from_camera);
+                    if tracked.overlap > 0.5 { tracked.scan_from_camera } else { k.scan_from_camera }
+                })
+                .collect()
+        });
+        let back = self.kept[0].scan_from_camera * poses[0].inverse();
+        self.kept.iter_mut().zip(poses).for_each(|(k, pose)| k.scan_from_camera = back * pose);
+        Ok(())
+    }
+
+    fn fuse_again(&mut self, with_color: bool) -> Result<Tsdf, FusionError> {
+        let with_color = with_color && self.kept.iter().any(|k| k.color.is_some());
+        let mut field = self.empty_field(with_color);
+        let window = self.window;
+        let (kept, sensor) = (&self.kept, &self.sensor);
+        self.clock.time("fuse again", || {
+            for group in kept.chunks(16) {
+                let views: Vec<View> = group.par_iter().map(|k| colored_view(k, sensor, window, with_color)).collect();
+                for (k, view) in group.iter().zip(&views) {
+                    integrate(&mut field, view, &k.scan_from_camera)?;
+                }
+            }
+            Ok::<(), FusionError>(())
+        })?;
+        Ok(field)
+    }
+
+    /// The transform from the model's frame to the scan's, and what it tells about the turn.
+    fn place(&self, raw: &Mesh, report: &mut FusionReport) -> Rigid {
+        let poses: Vec<Rigid> = self.kept.iter().map(|k| k.scan_from_camera).collect();
+        if self.settings.prior == Prior::None && self.volume.is_none() || self.settings.poses.is_some() {
+            return Rigid::identity();
+        }
+        let axis = find_axis(&poses);
+        let turned = axis.map_or(0.0, |a| total_turn(&a, &poses));
+        report.turned_deg = turned.abs().to_degrees();
+        report.full_turn = report.turned_deg >= FULL_TURN_DEG;
+        let span = self.kept.last().map_or(0, |k| k.device_time_ns) - self.kept[0].device_time_ns;
+        report.rate_deg_per_s = report.turned_deg / (span as f64 * 1e-9).max(1e-6);
+        let upright = Axis { point: Point3::origin(), direction: Vector3::y() };
+        let axis = match axis {
+            Some(mut a) if turned.abs() > 0.5 => {
+                if a.direction.y < 0.0 {
+                    a.direction = -a.direction;
+                }
+                if self.volume.as_ref().is_some_and(|v| v.floor.is_some()) {
+                    report.axis_tilt_deg = Some(a.direction.angle(&Vector3::y()).to_degrees());
+                }
+                a
+            }
+            _ => upright,
+        };
+        let has_floor = self.volume.as_ref().is_some_and(|v| v.floor.is_some());
+        let lowest = raw.positions.iter().map(|p| p.coords.cast::<f64>().dot(&axis.direction));
+        let ground = if has_floor { None } else { lowest.min_by(f64::total_cmp) };
+        scan_frame(&axis, &poses[0], ground)
+    }
+
+    fn scan(self, mesh: Mesh, field: &Tsdf, placed: &Rigid, mut report: FusionReport) -> Scan {
+        report.frames_seen = self.seen;
+        report.frames_fused = self.kept.len();
+        report.dropped = self.dropped;
+        report.volume = self.volume.as_ref().map(|v| VolumeReport {
+            radius_m: v.radius,
+            floor_found: v.floor.is_some(),
+            bottom_m: v.bottom.unwrap_or(0.0),
+            axis_distance_m: v.scan_from_camera.translation.vector.xz().norm(),
+        });
+        report.noise_mm = self.noise * 1e3;
+        report.truncation_mm = f64::from(field.truncation()) * 1e3;
+        let mut residuals: Vec<f64> = self.kept.iter().filter_map(|k| k.tracked.map(|t| t.residual * 1e3)).collect();
+        residuals.sort_unstable_by(f64::total_cmp);
+        report.residual_mm = residuals.get(residuals.len() / 2).copied().unwrap_or(0.0);
+        report.residual_max_mm = residuals.last().copied().unwrap_or(0.0);
+        report.warnings = warnings(&report);
+        let mut timings = self.clock.timings();
+        timings.blocks = field.block_count();
+        timings.voxels = field.block_count() * crate::tsdf::VOXELS;
+        timings.voxels_updated_per_frame = self.touched * crate::tsdf::VOXELS / self.kept.len().max(1);
+        timings.field_bytes = field.bytes();
+        let trajectory = self
+            .kept
+            .into_iter()
+            .map(|k| TrackedFrame {
+                index: k.index,
+                device_time_ns: k.device_time_ns,
+                scan_from_camera: placed * k.scan_from_camera,
+                tracked: k.tracked,
+            })
+            .collect();
+        Scan { mesh, trajectory, report, timings }
+    }
+}
+
+fn warnings(report: &FusionReport) -> Vec<String> {
+    let mut list = Vec::new();
+    if report.volume.is_some() && !report.full_turn && report.turned_deg > 0.0 {
+        list.push(format!("no full turn: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));
+    }
+    let lost = report.frames_seen.saturating_sub(report.frames_fused);
+    if lost * 20 > report.frames_seen {
+        list.push(format!("{lost} of {} frames could not be used", report.frames_seen));
+    }
+    if report.seam_after_mm > 5.0 {
+        list.push(format!("the turn closes only to {:.1} mm: the subject moved", report.seam_after_mm));
+    }
+    list
+}
+
+fn colored_view(kept: &Kept, sensor: &Sensor, window: usize, with_color: bool) -> View {
+    let mut view = kept.depth.view(window);
+    if let Some(image) = decode_color(kept.color.as_ref(), kept.index).filter(|_| with_color) {
+        view.add_colors(&image, sensor);
+    }
+    view
+}
+
+/// The scan's frame from the axis, the first camera and the ground's height along the axis (`None`: where the
+/// model's own level zero meets the axis).
+fn scan_frame(axis: &Axis, first: &Rigid, ground: Option<f64>) -> Rigid {
+    let y = axis.direction;
+    let along = match ground {
+        Some(g) => g - axis.point.coords.dot(&y),
+        None => -axis.point.y / y.y.max(0.1),
+    };
+    let origin = axis.point + y * along;
+    let toward = Point3::from(first.translation.vector) - origin;
+    let z = (toward - y * y.dot(&toward)).try_normalize(1e-9).unwrap_or_else(Vector3::z);
+    let rows = Rotation3::from_basis_unchecked(&[y.cross(&z), y, z]).transpose();
+    let rotation = UnitQuaternion::from_rotation_matrix(&rows);
+    Isometry3::from_parts(Translation3::from(-(rotation * origin.coords)), rotation)
+}
+
+/// The motion a share of the way from one to another.
+fn between(a: &Rigid, b: &Rigid, share: f64) -> Rigid {
+    let step = (a.rotation.inverse() * b.rotation).scaled_axis() * share;
+    let rotation = a.rotation * UnitQuaternion::from_scaled_axis(step);
+    Isometry3::from_parts(Translation3::from(a.translation.vector.lerp(&b.translation.vector, share)), rotation)
+}
