@@ -1,24 +1,18 @@
 //! Islands dropped, holes closed.
 
-use std::collections::VecDeque;
-
 use nalgebra::Point3;
 use toile_geometry::{
     Mesh,
-    topology::{Edges, boundary_loops, loop_length, vertex_components},
+    topology::{boundary_loops, loop_length, vertex_components},
     triangle::ray_hit,
 };
 
-use crate::{ExtractSettings, evidence::Evidence, labels::Labels, scan_graph::ScanGraph};
+use crate::{ExtractSettings, labels::Labels, scan_graph::ScanGraph};
 
 /// An island of old surface inside the garment is turned new up to this share of `least_area`, whatever it says.
 const ISLAND_SHARE: f32 = 0.2;
 /// Loops with more vertices than this are not closed: triangulating costs the cube.
 const MOST_RIM_VERTICES: usize = 450;
-/// A vertex whose normal is further than this (cosine) from the earlier surface's lies on a step.
-const STEP_FACING: f32 = 0.75;
-/// What has the garment's colour by more than this, nats, is its folded rim and no step.
-const STEP_COLOR: f32 = 1.0;
 /// A patch or hole belongs to the garment when this share of its surroundings does.
 const SURROUNDED: f64 = 0.95;
 
@@ -45,53 +39,6 @@ pub fn drop_islands(graph: &ScanGraph, labels: &mut Labels, settings: &ExtractSe
 fn flip(labels: &mut Labels, v: usize) {
     labels.garment[v] = !labels.garment[v];
     labels.confidence[v] = 0.5;
-}
-
-/// The step between a hem and what lies below it: from the garment's border inward, at most `depth` metres, every
-/// vertex that faces away from the earlier surface and does not have the garment's colour (`color_odds`). The hem is
-/// the ridge where that step begins.
-pub fn step_vertices(
-    scan: &Mesh,
-    graph: &ScanGraph,
-    evidence: &Evidence,
-    labels: &Labels,
-    color_odds: &[f32],
-    depth: f32,
-) -> Vec<u32> {
-    let rim = open_vertices(scan);
-    let on_border = |v: u32| {
-        let old = |n: u32| !labels.garment[n as usize];
-        !old(v) && (rim[v as usize] || graph.neighbors.of(v as usize).iter().any(|&n| old(n)))
-    };
-    let mut reached = vec![f32::INFINITY; graph.len()];
-    let mut queue: VecDeque<u32> = (0..graph.len() as u32).filter(|&v| on_border(v)).collect();
-    queue.iter().for_each(|&v| reached[v as usize] = 0.0);
-    let mut steps = Vec::new();
-    while let Some(v) = queue.pop_front() {
-        let i = v as usize;
-        if evidence.facing[i] > STEP_FACING || color_odds[i] > STEP_COLOR {
-            continue;
-        }
-        steps.push(v);
-        for &n in graph.neighbors.of(i) {
-            let far = reached[i] + (scan.positions[n as usize] - scan.positions[i]).norm();
-            if labels.garment[n as usize] && far < depth && reached[n as usize].is_infinite() {
-                reached[n as usize] = far;
-                queue.push_back(n);
-            }
-        }
-    }
-    steps
-}
-
-/// True for the vertices on open edges.
-fn open_vertices(mesh: &Mesh) -> Vec<bool> {
-    let edges = Edges::new(&mesh.triangles);
-    let mut open = vec![false; mesh.positions.len()];
-    for (e, _) in edges.vertices.iter().zip(&edges.uses).filter(|(_, u)| **u == 1) {
-        e.iter().for_each(|&v| open[v as usize] = true);
-    }
-    open
 }
 
 /// Filled vertices take part in the garment only where a patch of them is surrounded by it: below a skirt's hem the
@@ -200,6 +147,8 @@ fn triangulate(positions: &[Point3<f32>], polygon: &[u32]) -> Vec<[u32; 3]> {
 
 #[cfg(test)]
 mod tests {
+    use toile_geometry::topology::Edges;
+
     use super::*;
 
     fn tube_end() -> Mesh {

@@ -111,7 +111,8 @@ impl Evidence {
         (new / old).ln().clamp(-4.0, 4.0)
     }
 
-    /// Some parts are always uncovered or were covered before as they are now: the second best part tells the noise.
+    /// Some parts are always uncovered or were covered before as they are now, and posing is not equally good for all:
+    /// a low quantile over the parts tells the noise.
     fn estimate_noise(&mut self) {
         let of_part = |part: usize, value: &dyn Fn(usize) -> f32| {
             let mut values: Vec<f32> = (0..self.parts.len())
@@ -124,14 +125,14 @@ impl Evidence {
                 *values.select_nth_unstable_by(middle, f32::total_cmp).1
             })
         };
-        let second = |value: &dyn Fn(usize) -> f32| {
+        let low = |value: &dyn Fn(usize) -> f32| {
             let mut medians: Vec<f32> = (0..PART_COUNT).filter_map(|p| of_part(p, value)).collect();
             medians.sort_by(f32::total_cmp);
-            medians.get(1).or(medians.first()).copied().unwrap_or(0.0)
+            medians.get(medians.len() * 3 / 10).copied().unwrap_or(0.0)
         };
         // The median of |x| is ln 2 times the scale, for both distributions; parts differ, hence the half more.
         let scale = 1.5 / std::f32::consts::LN_2;
-        let (height, color) = (second(&|v| self.height[v].abs()), second(&|v| self.color[v]));
+        let (height, color) = (low(&|v| self.height[v].abs()), low(&|v| self.color[v]));
         self.height_noise = (height * scale).clamp(LEAST_DISTANCE_NOISE, MOST_DISTANCE_NOISE);
         self.color_noise = (color * scale).clamp(LEAST_COLOR_NOISE, MOST_COLOR_NOISE);
     }

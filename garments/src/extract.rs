@@ -15,6 +15,7 @@ use crate::{
     body_parts::{BodyPart, PART_COUNT, part_of},
     clean, common_frame, cut,
     evidence::{self, Evidence},
+    hem,
     labels::{self, Labels},
     scan_graph::ScanGraph,
     untangle,
@@ -26,8 +27,6 @@ const OPENING: f32 = 0.15;
 const SUNKEN: f32 = 0.012;
 /// So much sunken area makes a warning, square metres.
 const SUNKEN_AREA: f32 = 0.03;
-/// Log odds given to the steps at hems, nats.
-const STEP_ODDS: f32 = -2.0;
 /// Cloth this near to the inner thigh follows it, metres.
 const FOLLOWS: f32 = 0.06;
 /// New cloth on this share of the inner thighs goes around each leg by itself.
@@ -181,7 +180,7 @@ fn label(take: &Take, graph: &ScanGraph, evidence: &Evidence, settings: &Extract
     (guess, labels::label(graph, evidence, guess, Some(&free), settings))
 }
 
-/// Moves the border from the foot of each hem's step to its top.
+/// Moves the border from the foot of each hem's step half-way up.
 fn take_off_steps(
     take: &Take,
     graph: &ScanGraph,
@@ -190,10 +189,7 @@ fn take_off_steps(
     settings: &ExtractSettings,
 ) {
     let colors = labels::color_model(graph, labels);
-    let steps = clean::step_vertices(take.scan, graph, evidence, labels, &colors, settings.hem_depth);
-    for v in steps {
-        labels.log_odds[v as usize] = labels.log_odds[v as usize].min(STEP_ODDS);
-    }
+    hem::lower_steps(take.scan, graph, evidence, labels, &colors, settings);
     labels::relabel(graph, evidence, labels, settings);
 }
 

@@ -71,6 +71,16 @@ impl ScanGraph {
         self.areas.iter().map(|&a| f64::from(a)).sum()
     }
 
+    /// True for the vertices on open edges of the scan.
+    pub fn open_vertices(&self, scan: &Mesh) -> Vec<bool> {
+        let edges = Edges::new(&scan.triangles);
+        let mut open = vec![false; self.len()];
+        for (e, _) in edges.vertices.iter().zip(&edges.uses).filter(|(_, u)| **u == 1) {
+            e.iter().for_each(|&v| open[v as usize] = true);
+        }
+        open
+    }
+
     /// Connected sets of vertices for which `keep` holds: the set of each vertex (`u32::MAX` outside) and the area of
     /// each set.
     pub fn components(&self, keep: impl Fn(usize) -> bool) -> (Vec<u32>, Vec<f32>) {

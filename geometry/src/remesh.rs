@@ -30,7 +30,8 @@ pub fn isotropic(mesh: &Mesh, edge_length: f32) -> Mesh {
         work.even_valences();
         work.relax(&bvh, edge_length);
     }
-    let triangles: Vec<[u32; 3]> = (0..work.triangles.len()).filter(|&t| work.alive(t)).map(|t| work.triangles[t]).collect();
+    let triangles: Vec<[u32; 3]> =
+        (0..work.triangles.len()).filter(|&t| work.alive(t)).map(|t| work.triangles[t]).collect();
     let bare = Mesh::new(work.positions, triangles).filter_triangles(|_| true).0;
     with_attributes(bare, mesh, &bvh)
 }
