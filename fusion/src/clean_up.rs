@@ -1,10 +1,10 @@
-//! From the raw surface to the scan: one component, closed, smooth, light.
+//! From the raw surface to the scan: the person's pieces, closed, smooth, light.
 
 use std::collections::BTreeSet;
 
 use toile_geometry::{
     Mesh,
-    components::{largest_component, make_manifold, trim_border},
+    components::{large_components, make_manifold, trim_border},
     decimate::decimate,
     holes::{FILLED, fill_holes},
     smooth::taubin,
@@ -16,12 +16,20 @@ use crate::{
     surface::WEIGHT,
 };
 
+/// Pieces with this share of the largest one's area belong to the person: below a skirt and above a collar nobody
+/// sees how they hang together.
+const PIECE_SHARE: f64 = 0.015;
 /// Borders longer than this are closed by a surface of least area: a plate would bulge, metres.
-const PLATE_LENGTH: f32 = 0.5;
+const PLATE_LENGTH: f32 = 0.9;
 /// A hole whose border stays below this height over the disk is a sole, metres.
 const SOLE_HEIGHT: f32 = 0.03;
 /// A sole reaches the disk within this distance of its border, metres.
 const SOLE_EDGE: f32 = 0.008;
+
+/// A loose piece of at least this share of the largest one's area belongs to the subject.
+const LEAST_PIECE: f64 = 0.03;
+/// A loose piece lower than this is a remnant of the disk, metres.
+const FLAT: f32 = 0.06;
 
 /// What the clean-up did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -45,9 +53,9 @@ pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, on_floor: bool) -> (Me
     let mut mesh = make_manifold(&raw);
     let mut cleaned = Cleaned::default();
     if settings.volume == Volume::Auto {
-        let (one, pieces) = largest_component(&mesh);
+        let (one, pieces) = large_components(&mesh, PIECE_SHARE);
         let trimmed = make_manifold(&trim_border(&one, 3));
-        mesh = largest_component(&trimmed).0;
+        mesh = large_components(&trimmed, PIECE_SHARE).0;
         cleaned.pieces_removed = pieces.saturating_sub(1);
     }
     if closed {
@@ -70,6 +78,13 @@ pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, on_floor: bool) -> (Me
     cleaned.filled_percent = filled_percent(&mesh);
     cleaned.watertight = Edges::new(&mesh.triangles).is_closed();
     (mesh, cleaned)
+}
+
+/// The largest piece, and others that are large and no flat remains of a disk: legs below a long skirt.
+fn subject_pieces(pieces: &[Piece]) -> Vec<bool> {
+    let largest = pieces.iter().map(|p| p.area).fold(0.0, f64::max);
+    let belongs = |p: &Piece| p.area >= largest || (p.area > LEAST_PIECE * largest && p.high.y - p.low.y > FLAT);
+    pieces.iter().map(belongs).collect()
 }
 
 /// Border positions of the holes that lie on the disk.

@@ -1,24 +1,51 @@
 //! Connected pieces of a mesh and repairs that make it a manifold.
 
+use nalgebra::Point3;
+
 use crate::{
     Mesh,
     topology::{Edges, VertexTriangles, vertex_components},
 };
 
+/// A connected piece of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Piece {
+    /// Square metres.
+    pub area: f64,
+    /// Lowest coordinates.
+    pub low: Point3<f32>,
+    /// Highest coordinates.
+    pub high: Point3<f32>,
+}
+
 /// The connected piece with the largest area, and how many pieces there were.
 pub fn largest_component(mesh: &Mesh) -> (Mesh, usize) {
+    keep_components(mesh, |pieces| {
+        let largest = pieces.iter().map(|p| p.area).fold(0.0, f64::max);
+        let first = pieces.iter().position(|p| p.area == largest);
+        (0..pieces.len()).map(|i| Some(i) == first).collect()
+    })
+}
+
+/// Keeps the connected pieces that `choose` says true for, and tells how many there were.
+pub fn keep_components(mesh: &Mesh, choose: impl FnOnce(&[Piece]) -> Vec<bool>) -> (Mesh, usize) {
     let (label, count) = vertex_components(mesh.positions.len(), &mesh.triangles);
-    let mut areas = vec![0.0f64; count];
-    let mut pieces = vec![false; count];
+    let mut all: Vec<Option<Piece>> = vec![None; count];
     for (t, triangle) in mesh.triangles.iter().enumerate() {
-        let [a, b, c] = mesh.corners(t).map(|p| p.cast::<f64>());
-        let piece = label[triangle[0] as usize] as usize;
-        areas[piece] += (b - a).cross(&(c - a)).norm() * 0.5;
-        pieces[piece] = true;
+        let corners = mesh.corners(t);
+        let [a, b, c] = corners.map(|p| p.cast::<f64>());
+        let start = Piece { area: 0.0, low: corners[0], high: corners[0] };
+        let piece = all[label[triangle[0] as usize] as usize].get_or_insert(start);
+        piece.area += (b - a).cross(&(c - a)).norm() * 0.5;
+        piece.low = corners.iter().fold(piece.low, |l, p| l.inf(p));
+        piece.high = corners.iter().fold(piece.high, |h, p| h.sup(p));
     }
-    let largest = (0..count).max_by(|&a, &b| areas[a].total_cmp(&areas[b]).then(b.cmp(&a))).unwrap_or(0) as u32;
-    let (kept, _) = mesh.filter_triangles(|t| label[mesh.triangles[t][0] as usize] == largest);
-    (kept, pieces.iter().filter(|p| **p).count())
+    let numbers: Vec<usize> = (0..count).filter(|&c| all[c].is_some()).collect();
+    let pieces: Vec<Piece> = all.into_iter().flatten().collect();
+    let mut keep = vec![false; count];
+    numbers.iter().zip(choose(&pieces)).for_each(|(&c, chosen)| keep[c] = chosen);
+    let (kept, _) = mesh.filter_triangles(|t| keep[label[mesh.triangles[t][0] as usize] as usize]);
+    (kept, pieces.len())
 }
 
 /// Drops degenerate triangles and those on edges that more than two triangles share, then parts vertices whose
@@ -98,8 +125,6 @@ pub fn trim_border(mesh: &Mesh, passes: usize) -> Mesh {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Point3;
-
     use super::*;
 
     #[test]
