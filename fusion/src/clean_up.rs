@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use toile_geometry::{
     Mesh,
-    components::{large_components, make_manifold, trim_border},
+    components::{Piece, keep_components, make_manifold, trim_border},
     decimate::decimate,
     holes::{FILLED, fill_holes},
     smooth::taubin,
@@ -16,9 +16,6 @@ use crate::{
     surface::WEIGHT,
 };
 
-/// Pieces with this share of the largest one's area belong to the person: below a skirt and above a collar nobody
-/// sees how they hang together.
-const PIECE_SHARE: f64 = 0.015;
 /// Borders longer than this are closed by a surface of least area: a plate would bulge, metres.
 const PLATE_LENGTH: f32 = 0.9;
 /// A hole whose border stays below this height over the disk is a sole, metres.
@@ -53,9 +50,9 @@ pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, on_floor: bool) -> (Me
     let mut mesh = make_manifold(&raw);
     let mut cleaned = Cleaned::default();
     if settings.volume == Volume::Auto {
-        let (one, pieces) = large_components(&mesh, PIECE_SHARE);
+        let (one, pieces) = keep_components(&mesh, subject_pieces);
         let trimmed = make_manifold(&trim_border(&one, 3));
-        mesh = large_components(&trimmed, PIECE_SHARE).0;
+        mesh = keep_components(&trimmed, subject_pieces).0;
         cleaned.pieces_removed = pieces.saturating_sub(1);
     }
     if closed {
