@@ -123,7 +123,8 @@ impl FitReport {
         find(!human, !(0.6..=2.5).contains(&stature), format!("the body would stand {stature:.2} m tall"));
         let rms = self.shape_rms;
         find(rms > 1.8, rms > 3.0, format!("the shape is {rms:.1} times as unusual as an ordinary body's"));
-        self.verdict = worst;
+        // each doubt alone may have a reason; many together have one: the fit is wrong
+        self.verdict = if self.reasons.len() >= 3 { Verdict::Failed } else { worst };
     }
 }
 
