@@ -42,7 +42,9 @@ impl Rig {
         node.insert("name".into(), json!(joint.name()));
         node.insert("translation".into(), json!(local.translation.vector.as_slice()));
         if local.rotation.angle() > 0.0 {
-            node.insert("rotation".into(), json!(local.rotation.coords.as_slice()));
+            // In f64 a product of unit quaternions can exceed 1 in the last digit, which the format forbids.
+            let rotation = local.rotation.coords.map(|c| (c as f32).clamp(-1.0, 1.0));
+            node.insert("rotation".into(), json!(rotation.as_slice()));
         }
         if !children.is_empty() {
             node.insert("children".into(), json!(children));

@@ -43,7 +43,10 @@ fn wave() -> Motion {
             let t = f64::from(i);
             let mut pose = Pose::identity();
             pose.translation.y = 0.01 * t;
-            *pose.rotation_mut(Joint::RightUpperArm) = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.785 * t);
+            // every other one by the opposite quaternion, which is the same rotation
+            let turn = UnitQuaternion::from_euler_angles(0.0, 0.0, 0.785 * t);
+            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            *pose.rotation_mut(Joint::RightUpperArm) = UnitQuaternion::new_unchecked(turn.into_inner() * sign);
             *pose.rotation_mut(Joint::LeftLowerLeg) = UnitQuaternion::from_euler_angles(0.5, 0.0, 0.0);
             pose
         })
