@@ -41,9 +41,9 @@ fn flip(labels: &mut Labels, v: usize) {
     labels.confidence[v] = 0.5;
 }
 
-/// Filled vertices take part in the garment only where a patch of them is surrounded by it: below a skirt's hem the
-/// scan is closed by a membrane that is no cloth.
-pub fn settle_filled(graph: &ScanGraph, labels: &mut Labels) {
+/// Filled vertices take part in the garment only where a patch of them is surrounded by it and no bone passes through:
+/// below a skirt's hem and in a collar the scan is closed by a membrane that is no cloth.
+pub fn settle_filled(scan: &Mesh, graph: &ScanGraph, labels: &mut Labels, bones: &[[Point3<f32>; 2]]) {
     let filled = |v: usize| graph.filled[v] > 0.5;
     let (patch, areas) = graph.components(filled);
     let mut around = vec![[0u32; 2]; areas.len()];
@@ -52,10 +52,22 @@ pub fn settle_filled(graph: &ScanGraph, labels: &mut Labels) {
             around[patch[v] as usize][usize::from(labels.garment[n as usize])] += 1;
         }
     }
+    let mut passed = vec![false; areas.len()];
+    for (t, tri) in scan.triangles.iter().enumerate() {
+        // One filled corner will do: the patch's rim was seen.
+        if let Some(&v) = tri.iter().find(|&&v| filled(v as usize)) {
+            passed[patch[v as usize] as usize] |= bones.iter().any(|b| crosses(b, &scan.corners(t)));
+        }
+    }
     for v in (0..graph.len()).filter(|&v| filled(v)) {
         let [old, new] = around[patch[v] as usize];
-        labels.garment[v] = f64::from(new) > SURROUNDED * f64::from(old + new);
+        let surrounded = f64::from(new) > SURROUNDED * f64::from(old + new);
+        labels.garment[v] = surrounded && !passed[patch[v] as usize];
     }
+}
+
+fn crosses([from, to]: &[Point3<f32>; 2], corners: &[Point3<f32>; 3]) -> bool {
+    ray_hit(from, &(to - from), corners).is_some_and(|(t, _)| t <= 1.0)
 }
 
 /// Closes the scan's own holes whose rims belong to the garment all round, unless a bone passes through them: what
@@ -106,12 +118,12 @@ fn fill_where(mesh: &mut Mesh, wanted: impl Fn(&Mesh, &[u32]) -> bool) -> usize 
 }
 
 /// True where the segment goes through the fan from the loop's centre.
-fn passes(positions: &[Point3<f32>], rim: &[u32], [from, to]: &[Point3<f32>; 2]) -> bool {
+fn passes(positions: &[Point3<f32>], rim: &[u32], bone: &[Point3<f32>; 2]) -> bool {
     let sum = rim.iter().fold(nalgebra::Vector3::zeros(), |s, &v| s + positions[v as usize].coords);
     let center = Point3::from(sum / rim.len() as f32);
     (0..rim.len()).any(|i| {
         let (a, b) = (positions[rim[i] as usize], positions[rim[(i + 1) % rim.len()] as usize]);
-        ray_hit(from, &(to - from), &[center, a, b]).is_some_and(|(t, _)| t <= 1.0)
+        crosses(bone, &[center, a, b])
     })
 }
 

@@ -27,6 +27,10 @@ const AIM: f32 = 1.15;
 const ENOUGH: f32 = 0.9;
 /// Lower vertices are looked at when the upper layer is this near, metres.
 const NEAR: f32 = 0.02;
+/// Crossings are pushed by at most this many gaps a round.
+const MOST_CROSSING: f32 = 3.0;
+/// Rounds without progress after which stacking gives up.
+const PATIENCE: usize = 10;
 /// Lower vertices in a parallel chunk.
 const CHUNK: usize = 512;
 
@@ -92,12 +96,14 @@ fn push_out(upper: &mut Mesh, lowers: &[LowerSurface], settings: &StackSettings)
     let mut watch = Watch::new(upper, lowers);
     let mut report = LayerReport::default();
     let mut fresh = false;
+    let mut patience = Patience::default();
     for round in 0..settings.rounds {
         report.rounds = round + 1;
         let mut pushes = watch.samples(upper, lowers, settings);
         if pushes.is_empty() {
             // Each crossing asks for a little more than the last one, until it gives way.
-            pushes = crossing_pushes(upper, lowers, settings.gap * (1.0 + 0.25 * round as f32));
+            let more = (1.0 + 0.25 * round as f32).min(MOST_CROSSING);
+            pushes = crossing_pushes(upper, lowers, settings.gap * more);
         }
         if pushes.is_empty() {
             // Believed only after the layer was untangled and everything was looked at afresh.
@@ -110,6 +116,9 @@ fn push_out(upper: &mut Mesh, lowers: &[LowerSurface], settings: &StackSettings)
             continue;
         }
         fresh = false;
+        if !patience.goes_on(pushes.len()) {
+            break;
+        }
         // Late rounds act locally, so that opposing pushes do not carry each other along.
         let spread = settings.spread / (1.0 + round as f32 / 8.0);
         let moved = displace(upper, &system, &pushes, spread);
@@ -123,6 +132,25 @@ fn push_out(upper: &mut Mesh, lowers: &[LowerSurface], settings: &StackSettings)
     report.moved_max_m = moved.iter().copied().fold(0.0, f32::max);
     upper.recompute_normals();
     report
+}
+
+/// Gives up on layers that cannot be parted, such as a sheet through a limb.
+#[derive(Default)]
+struct Patience {
+    best: Option<usize>,
+    since: usize,
+}
+
+impl Patience {
+    /// Takes note of the pushes left; false when they have not become fewer for some rounds.
+    fn goes_on(&mut self, left: usize) -> bool {
+        if self.best.is_none_or(|best| left < best) {
+            (self.best, self.since) = (Some(left), 0);
+        } else {
+            self.since += 1;
+        }
+        self.since <= PATIENCE
+    }
 }
 
 fn own_crossings(mesh: &Mesh) -> usize {
