@@ -28,6 +28,8 @@ use crate::{ConformSettings, FitSettings, FittingError, articulated::State};
 const TIE: f64 = 2e-5;
 /// Length of the membrane energy, metres: too short to smooth what was seen, enough to rule over wide holes.
 const MEMBRANE: f64 = 0.002;
+/// Least trust of a scan point that a vertex follows: what fusion closed without seeing it is no surface.
+const SEEN: f32 = 0.1;
 /// A triangle that turned by more than this cosine from the model's is taken for folded.
 const FOLD_COS: f32 = 0.2;
 
@@ -113,6 +115,9 @@ impl Surface<'_> {
         let slip = (offset - n * offset.dot(n)).norm();
         if slip > 0.3 * hit.distance + 0.002 {
             return none; // the rim of a hole
+        }
+        if trust < SEEN {
+            return none;
         }
         let near = 1.0 - (f64::from(hit.distance) / self.settings.reach).powi(2);
         Pull { target: hit.point, weight: f64::from(trust).powi(2) * near.max(0.0) * freedom }

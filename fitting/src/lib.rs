@@ -26,6 +26,7 @@ mod start;
 mod summary;
 mod thin;
 mod under;
+mod under_stage;
 mod verdict;
 
 pub use body_fit::{BodyFit, fit_body};
