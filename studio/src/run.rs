@@ -16,6 +16,9 @@ use crate::{
     stage,
 };
 
+/// More threads than any machine that this runs on has processors.
+const MOST_THREADS: usize = 1024;
+
 /// What every command is given.
 pub struct Session {
     /// The options that every command takes.
@@ -90,6 +93,9 @@ fn not_understood(error: &clap::Error, json: bool) -> Outcome {
 }
 
 fn start_threads(threads: usize) -> Result<(), StudioError> {
+    if threads > MOST_THREADS {
+        return Err(StudioError::Usage(format!("--threads {threads} is more than {MOST_THREADS}")));
+    }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build_global()

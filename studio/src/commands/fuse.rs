@@ -70,6 +70,9 @@ impl Fuse {
             if self.out.is_some() {
                 return Err(StudioError::Usage("--out is for recordings and folders; a subject has its build/".into()));
             }
+            if self.poses.is_some() {
+                return Err(StudioError::Usage("--poses are those of one take; give its recording".into()));
+            }
             return reach(&self.path, Goal::Scans, &Options { fusion: settings, ..Options::default() }, session);
         }
         self.fuse_single(&settings, session)

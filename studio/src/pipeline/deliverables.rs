@@ -18,7 +18,7 @@ use crate::{
 /// Raised whenever the same inputs and settings give other files.
 const VERSION: u32 = 1;
 /// Expected seconds.
-pub const COST: f64 = 1.5;
+pub const COST: f64 = 0.5;
 
 /// Writes the avatar's files, unless they are up to date. `bvh` is the motion; without it, the shipped walk.
 ///

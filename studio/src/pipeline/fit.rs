@@ -19,7 +19,7 @@ use crate::{
 /// Raised whenever the same scan and settings give another body.
 const VERSION: u32 = 1;
 /// Expected seconds.
-pub const COST: f64 = 5.0;
+pub const COST: f64 = 4.0;
 
 /// Where the files of a fit go.
 pub struct Place {

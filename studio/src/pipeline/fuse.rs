@@ -16,7 +16,7 @@ use crate::{
 /// Raised whenever the same recording and settings give another scan.
 const VERSION: u32 = 1;
 /// Expected seconds for a turn of 100 frames.
-pub const COST: f64 = 10.0;
+pub const COST: f64 = 9.0;
 
 /// Fuses one take of a subject, unless that is up to date.
 ///

@@ -17,7 +17,7 @@ use crate::{
 /// Raised whenever the same inputs and settings give another pose.
 const VERSION: u32 = 1;
 /// Expected seconds.
-pub const COST: f64 = 3.0;
+pub const COST: f64 = 2.0;
 
 /// Poses the body inside take `n` (1 or more), unless that is up to date.
 ///

@@ -7,7 +7,7 @@ use std::{
 
 use toile_capture::Subject;
 use toile_garments::GarmentType;
-use toile_geometry::{Mesh, ply};
+use toile_geometry::{Mesh, obj, ply};
 
 use crate::{
     Progress, StudioError,
@@ -127,12 +127,13 @@ impl<'a> Run<'a> {
         self.folders.root.join("takes").join(format!("{layer}.mcap"))
     }
 
-    /// Reads a mesh, or says which file cannot be read.
+    /// Reads a mesh (PLY, or OBJ by its extension), or says which file cannot be read.
     ///
     /// # Errors
     /// [`StudioError`] where the file is missing or no mesh.
     pub fn read_mesh(&self, path: &Path) -> Result<Mesh, StudioError> {
-        Ok(ply::read(path)?)
+        let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+        Ok(if is_obj { obj::read(path)? } else { ply::read(path)? })
     }
 }
 

@@ -1,0 +1,101 @@
+//! Commands on single scans and recordings, ours and other people's.
+
+#![allow(clippy::unwrap_used)] // all of it is test code
+
+mod common;
+
+use std::{fs, path::PathBuf};
+
+use common::{exits, toile};
+use serde_json::Value;
+use toile_character::BodyModel;
+use toile_geometry::{Mesh, obj, ply};
+
+/// A folder of the private test data; `None`, with a word, where it is missing.
+fn private(name: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/real/rgbd")).join(name);
+    if !path.is_dir() {
+        println!("skipped: no private test data {name}");
+        return None;
+    }
+    Some(path)
+}
+
+fn json(path: PathBuf) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn a_scan_in_millimetres_is_fitted_with_a_notice() {
+    let dir = tempfile::tempdir().unwrap();
+    let model = BodyModel::load_default().unwrap();
+    let stature = model.mean.iter().map(|p| p.y).fold(0.0, f32::max);
+    let scan = dir.path().join("somebody.obj");
+    let large = model.mean.iter().map(|p| p * 1000.0).collect();
+    obj::write(&scan, &Mesh::new(large, model.triangles.clone())).unwrap();
+    let out = dir.path().join("fitted");
+    let answer = exits(0, toile().arg("fit").arg("--scan").arg(&scan).arg("--out").arg(&out));
+    assert!(answer["warnings"].to_string().contains("millimetres"), "{answer}");
+    let found = json(out.join("body.json"))["stature_m"].as_f64().unwrap();
+    assert!((found - f64::from(stature)).abs() < 0.01, "{found} m, not {stature} m");
+    for file in ["body.ply", "model.ply", "rest.ply", "rigged_scan.glb", "pose.json", "report.json"] {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+}
+
+#[test]
+fn what_is_no_person_and_what_is_no_mesh_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let corners =
+        (0..8).map(|i| [0.9 * (i & 1) as f32, 1.1 * (i >> 1 & 1) as f32, 0.8 * (i >> 2) as f32].into()).collect();
+    let faces = [
+        [0, 2, 1],
+        [1, 2, 3],
+        [4, 5, 6],
+        [5, 7, 6],
+        [0, 1, 4],
+        [1, 5, 4],
+        [2, 6, 3],
+        [3, 6, 7],
+        [0, 4, 2],
+        [2, 4, 6],
+        [1, 3, 5],
+        [3, 7, 5],
+    ];
+    let (chest, torn) = (dir.path().join("chest.ply"), dir.path().join("torn.ply"));
+    ply::write(&chest, &Mesh::new(corners, faces.to_vec())).unwrap();
+    let bytes = fs::read(&chest).unwrap();
+    fs::write(&torn, &bytes[..bytes.len() - 20]).unwrap();
+    for scan in [&chest, &torn] {
+        let out = dir.path().join("out");
+        let answer = exits(1, toile().arg("fit").arg("--scan").arg(scan).arg("--out").arg(&out));
+        let message = answer["error"]["message"].as_str().unwrap();
+        assert!(message.contains(scan.file_name().unwrap().to_str().unwrap()), "{message}");
+        assert!(!out.exists(), "nothing is written");
+    }
+}
+
+#[test]
+fn a_room_seen_by_a_hand_held_camera_is_fused_whole() {
+    let Some(room) = private("sevenscenes_kitchen_a") else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("room");
+    let words = ["--volume", "all", "--prior", "none", "--voxel", "10"];
+    exits(0, toile().arg("fuse").arg(room).args(words).arg("--out").arg(&out));
+    let scan = ply::read(&out.join("scan.ply")).unwrap();
+    let (low, high) = scan.bounds().unwrap();
+    assert!(scan.triangles.len() > 10_000 && (high - low).max() > 2.0, "{} triangles", scan.triangles.len());
+}
+
+#[test]
+fn a_real_person_turning_is_imported_and_the_turn_closes() {
+    let Some(person) = private("uva_cv2_person_turn") else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let subject = dir.path().join("person");
+    exits(0, toile().arg("import").arg(person).arg("--subject").arg(&subject).args(["--layer", "body"]));
+    exits(0, toile().arg("fuse").arg(&subject));
+    let report = json(subject.join("build/00-body/report.json"));
+    let fused = &report["stages"]["fuse"]["result"];
+    assert_eq!((&fused["frames_fused"], &fused["full_turn"]), (&100.into(), &true.into()), "{fused}");
+    assert!(fused["seam_after_mm"].as_f64().unwrap() < 5.0, "{fused}");
+}
