@@ -19,6 +19,9 @@ use patch::Patch;
 /// Name of the vertex attribute that is 1 where a patch was put in.
 pub const FILLED: &str = "filled";
 
+/// A plate with more than this many times the least area bulges over a hole that is no cap: it is not used.
+const MOST_BULGE: f64 = 1.2;
+
 /// What was closed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Filled {
@@ -79,7 +82,11 @@ fn close(
         let mut patch = Patch::new(points, triangles);
         patch.refine(&blocked);
         if length <= plate_length {
+            let flat = patch.clone();
             relax::relax(&mut patch, mesh, &reversed);
+            if patch.area() > MOST_BULGE * flat.area() {
+                patch = flat;
+            }
         }
         patch
     });

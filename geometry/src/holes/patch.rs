@@ -47,6 +47,15 @@ impl Patch {
         }
     }
 
+    /// Total area.
+    pub(super) fn area(&self) -> f64 {
+        let double = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| self.positions[v as usize]);
+            (b - a).cross(&(c - a)).norm()
+        };
+        0.5 * self.triangles.iter().map(double).sum::<f64>()
+    }
+
     fn border_edge(&self) -> f64 {
         let n = self.border;
         (0..n).map(|i| (self.positions[i] - self.positions[(i + 1) % n]).norm()).sum::<f64>() / n.max(1) as f64
