@@ -282,7 +282,7 @@ fn turned_guesses(pose: &Rigid, degrees: &[f64]) -> Vec<Rigid> {
 pub(crate) fn first_sensor(rig: &Rig) -> Result<&Sensor, FusionError> {
     let wrong = |reason: &str| FusionError::Calibration { sensor: 0, reason: reason.into() };
     let sensor = rig.sensors.first().ok_or_else(|| wrong("the source names no sensor"))?;
-    if !sensor.depth.is_valid() || !(sensor.depth_scale > 0.0) {
+    if !sensor.depth.is_valid() || sensor.depth_scale.is_nan() || sensor.depth_scale <= 0.0 {
         return Err(wrong("image size, focal length or depth scale is not positive"));
     }
     Ok(sensor)

@@ -270,8 +270,8 @@ impl Normal {
         let row = [m.x, m.y, m.z, n.x, n.y, n.z];
         for i in 0..6 {
             let wi = weight * row[i];
-            for j in 0..=i {
-                self.hessian[(i, j)] += wi * row[j];
+            for (j, column) in row.iter().enumerate().take(i + 1) {
+                self.hessian[(i, j)] += wi * column;
             }
             self.gradient[i] += wi * r;
         }

@@ -4,6 +4,7 @@
 //!
 //! BUILD is a subject's build folder with scans, poses and the body. OUT gets garments in the same layout, and for each
 //! take `labels.ply`: the scan with what was measured and decided as vertex attributes. All types are guessed.
+#![allow(clippy::print_stdout)] // a developer's tool
 
 use std::{error::Error, path::Path, time::Instant};
 

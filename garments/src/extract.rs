@@ -235,18 +235,17 @@ fn inner_thighs(take: &Take, labels: &Labels) -> f32 {
     let normals = take.scan.triangle_normals();
     let body_normals = take.body.vertex_normals();
     let (mut followed, mut inner) = (0, 0);
-    for v in 0..take.body.positions.len() {
+    for (v, n) in body_normals.iter().enumerate() {
         let side = match JOINTS.get(take.weights.joints[v][0] as usize) {
             Some(Joint::LeftUpperLeg) => 1.0,
             Some(Joint::RightUpperLeg) => -1.0,
             _ => continue,
         };
-        let n = body_normals[v];
         if n.dot(&across) * side > 0.8 {
             inner += 1;
-            let hit = bvh.ray(&take.body.positions[v], &n, FOLLOWS).filter(|h| {
+            let hit = bvh.ray(&take.body.positions[v], n, FOLLOWS).filter(|h| {
                 let new = labels.garment[take.scan.triangles[h.triangle as usize][0] as usize];
-                new && normals[h.triangle as usize].dot(&n) > 0.0
+                new && normals[h.triangle as usize].dot(n) > 0.0
             });
             followed += usize::from(hit.is_some());
         }

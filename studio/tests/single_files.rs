@@ -1,6 +1,6 @@
 //! Commands on single scans and recordings, ours and other people's.
 
-#![allow(clippy::unwrap_used)] // all of it is test code
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // all of it is test code
 
 mod common;
 

@@ -1,7 +1,7 @@
 //! The recorded session, end to end: every layer is there, any number of threads and any interruption give the same
 //! bytes, and outside programs accept the files.
 
-#![allow(clippy::unwrap_used)] // all of it is test code
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // all of it is test code
 
 use std::{
     collections::BTreeMap,

@@ -24,7 +24,7 @@ pub fn jpeg(bytes: &[u8]) -> Result<ColorImage, WebcamError> {
 /// [`WebcamError::Pixels`] where the bytes do not make up the image.
 pub fn yuyv(bytes: &[u8], width: u32, height: u32) -> Result<ColorImage, WebcamError> {
     let needed = width as usize * height as usize * 2;
-    if width % 2 != 0 || bytes.len() < needed {
+    if !width.is_multiple_of(2) || bytes.len() < needed {
         return Err(WebcamError::Pixels(format!("{} bytes of YUYV for {width}x{height}", bytes.len())));
     }
     let pairs = bytes[..needed].chunks_exact(4);

@@ -20,7 +20,7 @@ use toile_capture::{CaptureError, DeviceIdentity, Frame, Rig, Sensor, Source};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 /// Horizontal field of view assumed for an uncalibrated webcam, radians (60°, the usual for laptop cameras).
-const ASSUMED_FIELD_OF_VIEW: f64 = 1.0472;
+const ASSUMED_FIELD_OF_VIEW: f64 = std::f64::consts::FRAC_PI_3;
 
 /// Errors of the webcam driver.
 #[derive(Debug, thiserror::Error)]

@@ -47,8 +47,8 @@ pub(super) fn relax(patch: &mut Patch, mesh: &Mesh, border: &[u32]) {
         out.iter_mut().zip(&plate.free).filter(|(_, f)| !**f).for_each(|(o, _)| *o = Vector3::zeros());
     };
     let solution = least_squares(plate.positions.clone(), laplacian, transposed);
-    for v in patch.border..patch.positions.len() {
-        patch.positions[v] = Point3::from(solution[v]);
+    for (position, solved) in patch.positions.iter_mut().zip(&solution).skip(patch.border) {
+        *position = Point3::from(*solved);
     }
 }
 
