@@ -1,6 +1,6 @@
 # Two commands do everything on a fresh machine: `make demo` and `make test`.
 
-.PHONY: help setup build demo test bench score
+.PHONY: help setup build demo test bench
 .DEFAULT_GOAL := help
 
 TOILE := target/release/toile
@@ -17,7 +17,7 @@ build: setup ## Build the program
 demo: build ## Take the shipped recording to an avatar and say where to look
 	$(TOILE) demo
 
-test: build ## All tests, with the outside checkers that can be had here
+test: demo ## The demo, then all tests, with the outside checkers that can be had here
 	@bash scripts/outside.sh
 	bash scripts/cargo.sh test --release --locked --workspace
 
