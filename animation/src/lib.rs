@@ -2,8 +2,8 @@
 //!
 //! - [`bvh`]: motion files read and written;
 //! - [`retarget`](fn@retarget): any of the usual skeletons carried onto the target's 52 joints;
-//! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
-//! - [`resample`], [`close_loop`]: other rates, endless motions;
+//! - [`mod@walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
+//! - [`mod@resample`], [`close_loop`]: other rates, endless motions;
 //!
 //! ```
 //! use toile_animation::{RetargetSettings, retarget, shipped_walk};

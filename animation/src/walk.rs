@@ -1,7 +1,7 @@
 //! A walk made by rule, of our own making: what the program uses where no motion is given.
 //!
 //! One gait cycle is two steps; the left heel strikes at phase 0, the right at 0.5. Feet follow the rolling of a
-//! heel, a flat sole and a ball (in [`crate::gait`]); legs reach them by two-bone inverse kinematics; pelvis and
+//! heel, a flat sole and a ball (in `gait`); legs reach them by two-bone inverse kinematics; pelvis and
 //! trunk counter-rotate, rise and sink twice a cycle; arms hang close to the body and swing against the legs.
 //! Proportions are those of an adult 1.7 m tall; retargeting carries them to anyone.
 

@@ -76,7 +76,7 @@ pub struct Fuser {
 }
 
 impl Fuser {
-    /// A fuser for the first sensor of a rig. `volume` as [`survey`] finds it, or `None` for everything.
+    /// A fuser for the first sensor of a rig. `volume` as [`crate::survey`] finds it, or `None` for everything.
     ///
     /// # Errors
     /// Settings out of range, or a calibration that cannot be used.

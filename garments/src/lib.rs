@@ -8,7 +8,7 @@
 //! 3. [`hem`], [`cut`] and [`clean`]: the garment's own mesh, cut through triangles along a smooth hem, islands dropped, holes
 //!    closed;
 //! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
-//! 5. [`stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests.
+//! 5. [`mod@stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests.
 //!
 //! [`extract`](extract::extract) runs 1 to 4 for one take; [`stack`](stack::stack) runs 5 over all layers.
 //!
