@@ -1,7 +1,7 @@
 //! The shipped body model: its invariants, its joints, its speed, and that it can express unknown people.
 #![allow(clippy::unwrap_used)] // helpers of tests are not seen as tests
 
-use std::{path::PathBuf, time::Instant};
+use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -191,26 +191,6 @@ fn landmarks_are_where_their_names_say() {
         }
     }
     assert!(m.landmark("tail").is_none());
-}
-
-#[test]
-fn loading_and_shaping_are_fast() {
-    let best = |f: &dyn Fn()| {
-        (0..5)
-            .map(|_| {
-                let t = Instant::now();
-                f();
-                t.elapsed().as_secs_f64()
-            })
-            .fold(9.0, f64::min)
-    };
-    let load = best(&|| drop(model()));
-    let m = model();
-    let beta = someone();
-    let shape = best(&|| drop(m.shape(&beta)));
-    println!("load {:.1} ms, shape {:.2} ms", load * 1e3, shape * 1e3);
-    // Ten times what an idle machine takes, since tests share it.
-    assert!(load < 0.5 && shape < 0.05, "load {load} s, shape {shape} s");
 }
 
 #[test]
