@@ -12,7 +12,7 @@ Copies the session of recorded/ to demo/ beside it, processes it, and says where
 
 Examples:
   toile demo
-  toile demo --out /tmp/demo --motion dance.bvh";
+  toile demo --out tryout --motion dance.bvh";
 
 /// The whole way on the recorded session that ships with Toile
 #[derive(Debug, clap::Args)]

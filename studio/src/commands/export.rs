@@ -23,8 +23,8 @@ folder; what is missing before is run. A recording can be converted so that othe
 
 Examples:
   toile export anna --motion dance.bvh
-  toile export anna --glb /tmp/anna.glb
-  toile export anna/takes/00-body.mcap --mcap /tmp/plain.mcap";
+  toile export anna --glb anna-today.glb
+  toile export anna/takes/00-body.mcap --mcap plain.mcap";
 
 /// Write the avatar: GLB with a motion, VRM; or a take in a plain encoding
 #[derive(Debug, clap::Args)]

@@ -16,7 +16,7 @@ use crate::{
 const AFTER: &str = "\
 Examples:
   toile fit anna
-  toile fit --scan somebody.ply --out /tmp/somebody";
+  toile fit --scan somebody.ply --out somebody";
 
 /// Fit the body to the scan of the undressed person
 #[derive(Debug, clap::Args)]

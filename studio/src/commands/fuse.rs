@@ -20,7 +20,7 @@ PATH is a subject (all its takes are fused into SUBJECT/build/), one recording, 
 
 Examples:
   toile fuse anna
-  toile fuse anna/takes/01-trousers.mcap --out /tmp/trousers
+  toile fuse anna/takes/01-trousers.mcap --out trousers-scan
   toile fuse kitchen --volume all --prior none --out /tmp/kitchen";
 
 /// Fuse takes into scans
