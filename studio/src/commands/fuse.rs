@@ -21,7 +21,7 @@ PATH is a subject (all its takes are fused into SUBJECT/build/), one recording, 
 Examples:
   toile fuse anna
   toile fuse anna/takes/01-trousers.mcap --out trousers-scan
-  toile fuse kitchen --volume all --prior none --out /tmp/kitchen";
+  toile fuse kitchen --volume all --prior none --out kitchen-scan";
 
 /// Fuse takes into scans
 #[derive(Debug, clap::Args)]
