@@ -5,7 +5,10 @@ use std::path::Path;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use toile_capture::atomic_write;
+use toile_capture::{
+    atomic_write,
+    trajectory::{self, TimedPose},
+};
 use toile_character::joint::JOINTS;
 use toile_geometry::{Mesh, ply};
 use toile_render::{Camera, rasterize};
@@ -123,21 +126,13 @@ fn poses_text(take: &Take) -> String {
     let mut text = String::from(
         "# timestamp tx ty tz qx qy qz qw = subject_from_camera (metres; subject: y up, origin on the disk's axis at its top)\n",
     );
-    for (index, moment) in take.moments.iter().enumerate() {
-        let pose = take.subject_from_camera(index);
-        let (t, q) = (pose.translation.vector, pose.rotation.coords);
-        text.push_str(&format!(
-            "{:.9} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9} {:.9}\n",
-            moment.time_ns as f64 * 1e-9,
-            t.x,
-            t.y,
-            t.z,
-            q.x,
-            q.y,
-            q.z,
-            q.w
-        ));
-    }
+    let poses: Vec<TimedPose> = take
+        .moments
+        .iter()
+        .enumerate()
+        .map(|(index, moment)| TimedPose { time_ns: moment.time_ns, pose: take.subject_from_camera(index) })
+        .collect();
+    text.push_str(&trajectory::to_text(&poses));
     text
 }
 
