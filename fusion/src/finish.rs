@@ -113,16 +113,15 @@ impl Fuser {
         let with_color = with_color && self.kept.iter().any(|k| k.color.is_some());
         let mut field = self.empty_field(with_color);
         let window = self.window;
-        let (kept, sensor) = (&self.kept, &self.sensor);
-        self.clock.time("fuse again", || {
-            for group in kept.chunks(16) {
-                let views: Vec<View> = group.par_iter().map(|k| colored_view(k, sensor, window, with_color)).collect();
-                for (k, view) in group.iter().zip(&views) {
-                    integrate(&mut field, view, &k.scan_from_camera)?;
-                }
+        let (kept, sensor, clock) = (&self.kept, &self.sensor, &mut self.clock);
+        let step = if with_color { "integrate with colour" } else { "integrate again" };
+        for group in kept.chunks(16) {
+            let prepare = || group.par_iter().map(|k| colored_view(k, sensor, window, with_color)).collect();
+            let views: Vec<View> = clock.time("prepare again", prepare);
+            for (k, view) in group.iter().zip(&views) {
+                clock.time(step, || integrate(&mut field, view, &k.scan_from_camera))?;
             }
-            Ok::<(), FusionError>(())
-        })?;
+        }
         Ok(field)
     }
 
@@ -177,7 +176,7 @@ impl Fuser {
         let mut timings = self.clock.timings();
         timings.blocks = field.block_count();
         timings.voxels = field.block_count() * crate::tsdf::VOXELS;
-        timings.voxels_updated_per_frame = self.touched * crate::tsdf::VOXELS / self.kept.len().max(1);
+        timings.voxels_touched_per_frame = self.touched * crate::tsdf::VOXELS / self.kept.len().max(1);
         timings.field_bytes = field.bytes();
         let trajectory = self
             .kept

@@ -8,7 +8,7 @@ use toile_capture::{DepthImage, Frame, Rig, Source, depth_codec};
 use crate::{
     Fuser, FusionError, FusionSettings, Scan, Volume,
     fuser::{filtered, first_sensor},
-    report::DroppedFrame,
+    report::{DroppedFrame, Stopwatch},
     volume::{SURVEY_FRAMES, SubjectVolume, find_volume},
 };
 
@@ -55,17 +55,20 @@ pub fn fuse(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Scan, FusionError> {
     let rig = source.rig().clone();
-    let (frames, unreadable) = read_all(source, progress)?;
+    let mut clock = Stopwatch::new();
+    let (frames, unreadable) = clock.time("read", || read_all(source, progress))?;
     let volume = match settings.volume {
         Volume::All => None,
-        Volume::Auto => Some(survey(&rig, &spread(&frames), settings)?),
+        Volume::Auto => Some(clock.time("survey", || survey(&rig, &spread(&frames), settings))?),
     };
     let mut fuser = Fuser::new(&rig, volume, settings.clone())?;
+    fuser.clock = clock;
     fuser.seen += unreadable.len();
     fuser.dropped.extend(unreadable);
     let count = frames.len().max(1) as f32;
     for (i, frame) in frames.into_iter().enumerate() {
-        fuser.push(&frame.unpacked())?;
+        let frame = fuser.clock.time("unpack", || frame.unpacked());
+        fuser.push(&frame)?;
         progress(0.1 + 0.4 * (i + 1) as f32 / count);
     }
     fuser.finish(&|x| progress(0.5 + 0.5 * x))
