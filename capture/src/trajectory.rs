@@ -66,26 +66,30 @@ pub fn parse(text: &str) -> Result<Vec<TimedPose>, String> {
     for (number, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or("").trim();
         if !line.is_empty() {
-            let pose = parse_line(line).ok_or_else(|| {
-                format!("line {} is not `t tx ty tz qx qy qz qw` with a rotation of length 1", number + 1)
-            })?;
-            poses.push(pose);
+            poses.push(parse_line(line).map_err(|reason| format!("line {}: {reason}", number + 1))?);
         }
     }
     Ok(poses)
 }
 
-fn parse_line(line: &str) -> Option<TimedPose> {
-    let mut words = line.split_whitespace();
-    let time_ns = parse_seconds(words.next()?)?;
-    let numbers = words.map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect::<Option<Vec<f64>>>()?;
-    let [tx, ty, tz, qx, qy, qz, qw] = numbers.try_into().ok()?;
+fn parse_line(line: &str) -> Result<TimedPose, String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let [time, numbers @ ..] = words.as_slice() else { return Err("is empty".into()) };
+    let time_ns = parse_seconds(time).ok_or_else(|| format!("`{time}` is no time in seconds"))?;
+    let number = |word: &&str| {
+        let value = word.parse().ok().filter(|x: &f64| x.is_finite());
+        value.ok_or_else(|| format!("`{word}` is no finite number"))
+    };
+    let numbers: Vec<f64> = numbers.iter().map(number).collect::<Result<_, _>>()?;
+    let [tx, ty, tz, qx, qy, qz, qw] = numbers[..] else {
+        return Err(format!("has {} values, not the eight `t tx ty tz qx qy qz qw`", words.len()));
+    };
     let rotation = Quaternion::new(qw, qx, qy, qz);
     if (rotation.norm() - 1.0).abs() > 0.01 {
-        return None;
+        return Err(format!("the rotation qx qy qz qw has length {:.3}, not 1", rotation.norm()));
     }
     let rotation = UnitQuaternion::from_quaternion(rotation);
-    Some(TimedPose { time_ns, pose: Rigid::from_parts(Translation3::new(tx, ty, tz), rotation) })
+    Ok(TimedPose { time_ns, pose: Rigid::from_parts(Translation3::new(tx, ty, tz), rotation) })
 }
 
 /// Nanoseconds from decimal seconds, exact to the nanosecond (a f64 would lose them for Unix times).
@@ -137,12 +141,21 @@ mod tests {
     }
 
     #[test]
-    fn wrong_lines_are_named() {
-        let text = "# comment\n1.5 0 0 0 0 0 0 1\n2.5 0 0 0 0 0 1\n";
-        assert!(parse(text).unwrap_err().contains("line 3"));
-        assert!(parse("1 0 0 0 0 0 0 0").is_err(), "a quaternion of length 0 was accepted");
-        assert!(parse("1 0 0 NaN 0 0 0 1").is_err(), "NaN was accepted");
-        assert!(parse("x 0 0 0 0 0 0 1").is_err(), "a time that is no number was accepted");
+    fn wrong_lines_are_named_with_the_reason() {
+        let good = "# comment\n1.5 0 0 0 0 0 0 1\n";
+        let wrong = [
+            ("2.5 0 0 0 0 0 1", "line 3: has 7 values, not the eight"),
+            ("2.5 0 0 0 0 0 0 1 9", "line 3: has 9 values"),
+            ("2.5", "line 3: has 1 values"),
+            ("2.5 0 0 0 0 0 0 0", "line 3: the rotation qx qy qz qw has length 0.000, not 1"),
+            ("2.5 0 0 NaN 0 0 0 1", "line 3: `NaN` is no finite number"),
+            ("2.5 0 0,1 0 0 0 0 1", "line 3: `0,1` is no finite number"),
+            ("x 0 0 0 0 0 0 1", "line 3: `x` is no time in seconds"),
+        ];
+        for (line, reason) in wrong {
+            let error = parse(&format!("{good}{line}\n")).unwrap_err();
+            assert!(error.contains(reason), "{line}: {error}");
+        }
         assert_eq!(parse("1e-3 0 0 0 0 0 0 1").unwrap()[0].time_ns, 1_000_000);
         assert_eq!(parse("").unwrap(), []);
     }
