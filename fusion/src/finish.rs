@@ -9,7 +9,7 @@ use crate::{
     FusionError, Prior, Scan, TrackedFrame,
     clean_up::clean_up,
     closing::close,
-    fuser::{Fuser, Kept},
+    fuser::{Fuser, Kept, NO_KNOWN_POSE},
     integrate::integrate,
     motion::{Axis, find_axis, total_turn},
     report::{FusionReport, VolumeReport},
@@ -197,7 +197,14 @@ fn warnings(report: &FusionReport) -> Vec<String> {
     if report.volume.is_some() && !report.full_turn && report.turned_deg > 0.0 {
         list.push(format!("no full turn: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));
     }
-    let lost = report.frames_seen.saturating_sub(report.frames_fused);
+    let unknown = report.dropped.iter().filter(|d| d.reason == NO_KNOWN_POSE).count();
+    if unknown > 0 {
+        list.push(format!(
+            "{unknown} of {} frames have no known pose within 5 ms and are left out",
+            report.frames_seen
+        ));
+    }
+    let lost = report.frames_seen.saturating_sub(report.frames_fused + unknown);
     if lost * 20 > report.frames_seen {
         list.push(format!("{lost} of {} frames could not be used", report.frames_seen));
     }

@@ -32,6 +32,9 @@ const FIRST_TURNS: [f64; 11] = [0.0, 1.5, -1.5, 3.5, -3.5, 6.0, -6.0, 9.0, -9.0,
 /// The band is at least this many standard deviations of the noise.
 const NOISE_BAND: f64 = 4.5;
 
+/// Why a frame is dropped that none of the known poses belongs to.
+pub(crate) const NO_KNOWN_POSE: &str = "no known pose within 5 ms of it";
+
 /// What became of a pushed frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
@@ -193,7 +196,7 @@ impl Fuser {
             return nearest
                 .filter(|k| (k.device_time_ns - frame.device_time_ns).abs() <= 5_000_000)
                 .map(|k| (k.scan_from_camera, None))
-                .ok_or_else(|| "no known pose within 5 ms".into());
+                .ok_or_else(|| NO_KNOWN_POSE.into());
         }
         if self.kept.is_empty() {
             return Ok((self.volume.as_ref().map_or_else(Rigid::identity, |v| v.scan_from_camera), None));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use serde_json::json;
-use toile_capture::trajectory;
+use toile_capture::{CaptureError, trajectory};
 use toile_fusion::{FusionSettings, KnownPose, Prior, Volume};
 
 use crate::{
@@ -21,7 +21,8 @@ PATH is a subject (all its takes are fused into SUBJECT/build/), one recording, 
 Examples:
   toile fuse anna
   toile fuse anna/takes/01-trousers.mcap --out trousers-scan
-  toile fuse kitchen --volume all --prior none --out kitchen-scan";
+  toile fuse kitchen --volume all --prior none --out kitchen-scan
+  toile fuse kitchen --volume all --poses kitchen.tum --voxel 4 --truncation 16 --threads 1";
 
 /// Fuse takes into scans
 #[derive(Debug, clap::Args)]
@@ -44,6 +45,9 @@ pub struct Fuse {
     /// Size of a voxel, millimetres
     #[arg(long, value_name = "MM", default_value_t = 1e3 * FusionSettings::default().voxel_size)]
     voxel: f64,
+    /// Truncation of the signed distances, millimetres (default: four voxels); noisy depth widens it
+    #[arg(long, value_name = "MM")]
+    truncation: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -83,7 +87,11 @@ impl Fuse {
             return Err(StudioError::Usage(format!("--voxel {} is not between 0.5 and 50 mm", self.voxel)));
         }
         let defaults = FusionSettings::default();
-        let voxel_size = self.voxel * 1e-3;
+        let truncation = self.truncation.unwrap_or(self.voxel * defaults.truncation / defaults.voxel_size);
+        if !(2.0 * self.voxel..1000.0).contains(&truncation) {
+            let reason = format!("--truncation {truncation} is not between two voxels and 1000 mm");
+            return Err(StudioError::Usage(reason));
+        }
         Ok(FusionSettings {
             volume: match self.volume {
                 VolumeChoice::Auto => Volume::Auto,
@@ -94,9 +102,8 @@ impl Fuse {
                 PriorChoice::None => Prior::None,
             },
             poses: self.poses.as_deref().map(known_poses).transpose()?,
-            // The truncation follows the voxels.
-            truncation: defaults.truncation / defaults.voxel_size * voxel_size,
-            voxel_size,
+            truncation: truncation * 1e-3,
+            voxel_size: self.voxel * 1e-3,
             ..defaults
         })
     }
@@ -121,5 +128,8 @@ impl Fuse {
 
 fn known_poses(path: &Path) -> Result<Vec<KnownPose>, StudioError> {
     let poses = trajectory::read(path)?;
+    if poses.is_empty() {
+        return Err(CaptureError::format(path, "holds no pose; a line is `t tx ty tz qx qy qz qw`").into());
+    }
     Ok(poses.iter().map(|p| KnownPose { device_time_ns: p.time_ns, scan_from_camera: p.pose }).collect())
 }
