@@ -1,48 +1,145 @@
-//! Benchmarks of the fusion stage over the session that ships with Toile; cases are named stage/case/size.
+//! Benchmarks of the fusion stage on generated frames (a figure of capsules that turns on a disk before a wall); cases are
+//! named stage/case/size. Run with `RAYON_NUM_THREADS=1` for the figures of one thread.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use std::{hint::black_box, path::Path};
+#[path = "../src/test_scene.rs"]
+#[allow(dead_code, unreachable_pub)]
+mod test_scene;
 
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use toile_capture::{Frame, Replay, Rig, Source};
-use toile_fusion::{Fuser, FusionSettings, fuse, survey};
+use std::{cell::Cell, hint::black_box};
 
-/// Frames pushed by the streaming case.
-const PUSHED: usize = 20;
+use criterion::{BatchSize, Bencher, Criterion, criterion_group, criterion_main};
+use test_scene::{Memory, Scene, steps};
+use toile_capture::Frame;
+use toile_fusion::{
+    Fuser, FusionSettings,
+    depth_filter::drop_edges,
+    fuse,
+    integrate::integrate,
+    normals::normals_from_depth,
+    raycast::ray_cast,
+    surface::extract_surface,
+    survey,
+    track::track,
+    tsdf::Tsdf,
+    view::{CutDepth, View, rectified_depth},
+};
+use toile_geometry::{Rigid, camera::PinholeCamera};
 
-fn take() -> Replay {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recorded/rowan/takes/00-body.mcap");
-    Replay::open(&path).unwrap()
+/// Frames that the cases of single frames go through in turn, and degrees between them.
+const FRAMES: usize = 12;
+const STEP_DEG: f64 = 4.0;
+/// Frames and degrees between them of a whole take.
+const TAKE: (usize, f64) = (60, 6.1);
+
+/// Frames of one image size with their true poses.
+struct Material {
+    scene: Scene,
+    size: String,
+    frames: Vec<Frame>,
+    views: Vec<View>,
+    poses: Vec<Rigid>,
 }
 
-fn frames() -> (Rig, Vec<Frame>) {
-    let mut replay = take();
-    let frames = std::iter::from_fn(|| replay.next_frame().unwrap()).collect();
-    (replay.rig().clone(), frames)
+impl Material {
+    fn new(width: u32, height: u32, focal: f64) -> Self {
+        let center = [f64::from(width - 1) / 2.0, f64::from(height - 1) / 2.0];
+        let scene =
+            Scene { camera: PinholeCamera::ideal(width, height, focal, focal, center[0], center[1]), ..Scene::new() };
+        let figure = Scene { with_floor: false, with_wall: false, ..scene.clone() };
+        let angles = steps(FRAMES, STEP_DEG);
+        let view = |frame: &Frame| {
+            let (camera, depth) = rectified_depth(frame.depth.as_ref().unwrap(), &figure.rig().sensors[0], 6.0);
+            let mut view = CutDepth::new(&camera, &drop_edges(&camera, &depth, 8.3), 0.001).view(2);
+            view.colors = view.normals.iter().map(|n| n.map(|c| 128 + (100.0 * c) as u8)).collect();
+            view
+        };
+        Self {
+            size: format!("{width}x{height}"),
+            frames: scene.frames(&angles),
+            views: figure.frames(&angles).iter().map(view).collect(),
+            poses: angles.iter().map(|a| scene.figure_from_camera(a.unwrap())).collect(),
+            scene,
+        }
+    }
+
+    /// The field of all frames.
+    fn model(&self, with_color: bool) -> Tsdf {
+        let mut model = Tsdf::new(0.004, 0.016, with_color);
+        self.views.iter().zip(&self.poses).for_each(|(v, p)| {
+            integrate(&mut model, v, p).unwrap();
+        });
+        model
+    }
+}
+
+/// Times one frame after the other.
+fn each<T>(b: &mut Bencher<'_>, mut run: impl FnMut(usize) -> T) {
+    let next = Cell::new(0);
+    b.iter(|| {
+        let i = next.replace((next.get() + 1) % FRAMES);
+        black_box(run(i))
+    });
+}
+
+/// One case a step of a frame.
+fn steps_of_a_frame(c: &mut Criterion, m: &Material) {
+    let mut group = c.benchmark_group("fusion");
+    group.sample_size(20);
+    let settings = FusionSettings::default();
+    let camera = m.scene.camera;
+    let sensor = &m.scene.rig().sensors[0];
+    let raw: Vec<Vec<f32>> =
+        m.frames.iter().map(|f| rectified_depth(f.depth.as_ref().unwrap(), sensor, 6.0).1).collect();
+    group.bench_function(format!("filter/{}", m.size), |b| {
+        each(b, |i| drop_edges(&camera, &raw[i], settings.jump_slope));
+    });
+    group.bench_function(format!("normals/{}", m.size), |b| {
+        each(b, |i| normals_from_depth(&m.views[i].camera, &m.views[i].depth, 2));
+    });
+    for (name, with_color) in [("integrate", false), ("integrate-colour", true)] {
+        let mut field = m.model(with_color);
+        group.bench_function(format!("{name}/{}", m.size), |b| {
+            each(b, |i| integrate(&mut field, &m.views[i], &m.poses[i]).unwrap());
+        });
+    }
+    let model = m.model(false);
+    group.bench_function(format!("raycast/{}", m.size), |b| {
+        each(b, |i| ray_cast(&model, &m.views[i].camera, &m.poses[i], 1));
+    });
+    group.bench_function(format!("track/{}", m.size), |b| {
+        // From the pose before: as far off as a turn without any prior.
+        each(b, |i| track(&model, &m.views[i], &m.poses[i.saturating_sub(1)]));
+    });
+    group.bench_function(format!("extract/{}", m.size), |b| b.iter(|| extract_surface(&model, 6)));
+    group.finish();
+}
+
+/// Frames pushed one by one, and a whole take from frames in memory to the finished scan.
+fn takes(c: &mut Criterion, m: &Material) {
+    let mut group = c.benchmark_group("fusion");
+    group.sample_size(10);
+    let settings = FusionSettings::default();
+    let frames = m.scene.frames(&steps(TAKE.0, TAKE.1));
+    let rig = m.scene.rig();
+    let volume = survey(&rig, &frames, &settings).unwrap();
+    let fuser = || Fuser::new(&rig, Some(volume.clone()), settings.clone()).unwrap();
+    let push = |mut fuser: Fuser| frames[..FRAMES].iter().map(|f| fuser.push(f).unwrap()).last();
+    group.bench_function(format!("push/{}x{FRAMES}", m.size), |b| b.iter_batched(fuser, push, BatchSize::LargeInput));
+    let source = || Memory { rig: rig.clone(), frames: frames.clone(), next: 0 };
+    let whole = |mut source: Memory| fuse(&mut source, &settings, &|_| {}).unwrap();
+    group.bench_function(format!("take/{}x{}", m.size, TAKE.0), |b| {
+        b.iter_batched(source, whole, BatchSize::LargeInput);
+    });
+    group.finish();
 }
 
 fn benches(c: &mut Criterion) {
-    let (rig, frames) = frames();
-    let settings = FusionSettings::default();
-    let volume = survey(&rig, &frames, &settings).unwrap();
-    let mut group = c.benchmark_group("fusion");
-    group.sample_size(10);
-    let start = || Fuser::new(&rig, Some(volume.clone()), settings.clone()).unwrap();
-    group.bench_function(format!("push/512x424/{PUSHED}"), |b| {
-        b.iter_batched(
-            start,
-            |mut fuser| {
-                for frame in &frames[..PUSHED] {
-                    black_box(fuser.push(frame).unwrap());
-                }
-            },
-            BatchSize::LargeInput,
-        );
-    });
-    group.bench_function(format!("take/512x424/{}", frames.len()), |b| {
-        b.iter_batched(take, |mut replay| fuse(&mut replay, &settings, &|_| {}).unwrap(), BatchSize::LargeInput);
-    });
-    group.finish();
+    for (width, height, focal) in [(512, 424, 365.0), (640, 480, 525.0)] {
+        let material = Material::new(width, height, focal);
+        steps_of_a_frame(c, &material);
+        takes(c, &material);
+    }
 }
 
 criterion_group!(fusion, benches);
