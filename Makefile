@@ -1,6 +1,6 @@
 # Two commands do everything on a fresh machine: `make demo` and `make test`.
 
-.PHONY: help setup build demo test bench
+.PHONY: help setup build demo test bench peers
 .DEFAULT_GOAL := help
 
 TOILE := target/release/toile
@@ -23,3 +23,6 @@ test: demo ## The demo, then all tests, with the outside checkers that can be ha
 
 bench: setup ## Benchmarks
 	bash scripts/cargo.sh bench --locked --workspace --benches
+
+peers: build ## Fusion beside Open3D and small_gicp (from PyPI) on the same frames; FRAMES=folder for other frames
+	python3 tests/peers/fusion.py $(FRAMES)
