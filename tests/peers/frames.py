@@ -114,6 +114,7 @@ def score(take, vertices, triangles):
     on_scan, on_truth = (np.asarray(m.sample_points_uniformly(200_000).points, np.float32) for m in (scan, truth))
     to_truth, to_scan = scene_of(o3d, truth), scene_of(o3d, scan)
     seen = visible(take, to_truth, on_truth)
+    seen &= on_truth[:, 1] > 0.005 + DISK_M   # what stands on the disk was cut away
     accuracy = to_truth.compute_distance(on_scan).numpy()
     complete = to_scan.compute_distance(on_truth[seen]).numpy()
     return {"accuracy": 1e3 * accuracy.mean(), "complete": 100 * (complete < 0.005).mean()}

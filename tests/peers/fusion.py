@@ -28,7 +28,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "target/peers"
-PACKAGES = ["numpy", "pillow", "open3d-cpu", "small_gicp"]
+# Open3D is held at 0.19: in 0.20.0's wheel ScalableTSDFVolume integrates nothing (no error, an empty mesh).
+PACKAGES = ["numpy", "pillow", "open3d-cpu==0.19.0", "small_gicp"]
 VOXEL, TRUNCATION, EDGE = 0.004, 0.016, 0.05
 ONE_THREAD = {f"{lib}_NUM_THREADS": "1" for lib in ("OMP", "OPENBLAS", "MKL", "TBB", "RAYON")}
 
@@ -40,7 +41,7 @@ def environment():
         subprocess.run([sys.executable, "-m", "venv", str(OUT / "env")], check=True)
     have = subprocess.run([python, "-m", "pip", "list", "--format", "freeze"], capture_output=True, text=True).stdout.lower()
     for package in PACKAGES:
-        if f"{package}==" not in have:
+        if (package if "==" in package else f"{package}==") not in have:
             print(f"installing {package} from PyPI", file=sys.stderr)
             problem = ended(python, "-m", "pip", "install", "-q", "--timeout", "20", "--retries", "1", package)
             if problem:
