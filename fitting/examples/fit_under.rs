@@ -4,7 +4,7 @@
 use std::{path::Path, time::Instant};
 
 use toile_character::BodyModel;
-use toile_fitting::{FitSettings, UnderSettings, fit_body, pose_under, rigged_scan};
+use toile_fitting::{FitSettings, UnderSettings, fit_body, pose_under, rigged_scan, settle_under};
 use toile_geometry::ply;
 
 #[allow(clippy::print_stdout)]
@@ -22,8 +22,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let start = Instant::now();
         let under = pose_under(&dressed, &[], &pose, &scan, &UnderSettings::default(), &|_| {})?;
         println!("{path}: {:.2} s {}", start.elapsed().as_secs_f64(), serde_json::to_string(&under.report)?);
-        pose = under.pose;
-        ply::write(&out.join(format!("{}-body.ply", n + 1)), &fit.body.posed_mesh(&pose))?;
+        let start = Instant::now();
+        let settled = settle_under(&model, &fit.body, &under.pose, &scan)?;
+        println!("  {:.2} s {:?}", start.elapsed().as_secs_f64(), settled.report);
+        pose = settled.pose;
+        ply::write(&out.join(format!("{}-body.ply", n + 1)), &settled.mesh)?;
         ply::write(&out.join(format!("{}-dressed.ply", n + 1)), &dressed.posed_mesh(&pose))?;
         let joints: std::collections::BTreeMap<_, [f64; 3]> = toile_character::joint::JOINTS
             .iter()

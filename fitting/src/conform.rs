@@ -75,7 +75,7 @@ pub(crate) fn conform(
 fn freedom(model: &BodyModel) -> Vec<f64> {
     let of = |v: usize| match model.regions[v] {
         _ if model.inner[v] => 0.0,
-        Region::LeftHand | Region::RightHand => 0.1,
+        Region::LeftHand | Region::RightHand => 0.01, // fingers melt together in a scan: the model's hands are nearer
         _ => 1.0,
     };
     (0..model.mean.len()).map(of).collect()
@@ -243,7 +243,7 @@ fn folded(model: &BodyModel, start: &[Point3<f32>], points: &[Point3<f32>]) -> V
 }
 
 /// Where folds are left, the neighbourhood goes back towards the model, step by step.
-fn unfolded(model: &BodyModel, start: &[Point3<f32>], mut points: Vec<Point3<f32>>) -> Vec<Point3<f32>> {
+pub(crate) fn unfolded(model: &BodyModel, start: &[Point3<f32>], mut points: Vec<Point3<f32>>) -> Vec<Point3<f32>> {
     for _ in 0..8 {
         let folds = folded(model, start, &points);
         if folds.is_empty() {

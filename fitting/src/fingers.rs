@@ -1,13 +1,13 @@
 //! Wrists and fingers, once the body stands: a few hundred vertices, thirty-two joints.
 
-use toile_character::{BodyModel, Joint, Region};
+use toile_character::{BodyModel, Joint, Pose, Region, SkinnedMesh, joint::JOINTS};
 use toile_geometry::Mesh;
 
 use crate::{
     FitSettings, FittingError,
     articulated::{Articulated, Columns, State},
     cloud::{Cloud, Samples},
-    correspond::Gate,
+    correspond::{Gate, matches},
     level::Level,
     prior::JointPrior,
     thin::Thinned,
@@ -19,8 +19,12 @@ const CELL: f32 = 0.004;
 const NEAR: f32 = 0.03;
 /// Least part of the hands' area with scan near it; below, the fingers stay at rest.
 const LEAST_SEEN: f32 = 0.3;
+const WRISTS: [Joint; 2] = [Joint::LeftHand, Joint::RightHand];
+/// Standard deviation of the turn of wrists from one take to the next, radians (3.4°).
+const AGAIN_SIGMA: f64 = 0.06;
 
-/// Turns wrists and fingers to the scan; everything else stays. Hands that the scan does not show keep their pose.
+/// Turns wrists and fingers of the statistical body to the scan; everything else stays. Hands that the scan does not
+/// show keep their pose.
 pub(crate) fn fit_fingers(
     model: &BodyModel,
     scan: &Mesh,
@@ -29,9 +33,51 @@ pub(crate) fn fit_fingers(
     state: State,
 ) -> Result<State, FittingError> {
     let mesh = Mesh::new(model.mean.clone(), model.triangles.clone());
+    let body = Articulated::of_model(model, &hands(model, &mesh), state.beta.len());
+    // fingers have hardly been seen yet: what the scan says of them counts little against the resting hand
+    let prior = JointPrior::standing(&model.mean_skeleton);
+    let joints = JOINTS.into_iter().filter(|j| j.is_finger() || WRISTS.contains(j)).collect();
+    turned(&body, scan, trust, &prior, Turn { joints, noise: 0.015, shape_sigma: settings.shape_sigma }, state)
+}
+
+/// The same, wrists only, for a body whose own shape is known (template topology), from a pose that is nearly right: the hands of
+/// the person who stepped onto the table again. A pose that agrees less with the scan is not taken.
+pub(crate) fn fit_hands_again(
+    model: &BodyModel,
+    body: &SkinnedMesh,
+    scan: &Mesh,
+    trust: &[f32],
+    pose: &Pose,
+) -> Result<Pose, FittingError> {
+    let body = Articulated::of_skinned(body, &hands(model, &body.mesh));
+    let state = State { pose: pose.clone(), beta: Vec::new() };
+    let prior = JointPrior::around(pose.clone(), AGAIN_SIGMA);
+    // fingers stay: how they moved since is finer than a scan in which they often melt together
+    let turn = Turn { joints: WRISTS.to_vec(), noise: 0.004, shape_sigma: 1.0 };
+    Ok(turned(&body, scan, trust, &prior, turn, state)?.pose)
+}
+
+/// Samples of both hands' skin.
+fn hands(model: &BodyModel, mesh: &Mesh) -> Thinned {
     let is_hand = |v: usize| matches!(model.regions[v], Region::LeftHand | Region::RightHand);
-    let picked = Thinned::new(&mesh, &mesh.vertex_normals(), CELL, |v| is_hand(v) && !model.inner[v]);
-    let body = Articulated::of_model(model, &picked, state.beta.len());
+    Thinned::new(mesh, &mesh.vertex_normals(), CELL, |v| is_hand(v) && !model.inner[v])
+}
+
+/// Which joints turn, and how much the scan counts (metres, as [`Gate::noise`]).
+struct Turn {
+    joints: Vec<Joint>,
+    noise: f32,
+    shape_sigma: f64,
+}
+
+fn turned(
+    body: &Articulated,
+    scan: &Mesh,
+    trust: &[f32],
+    prior: &JointPrior,
+    turn: Turn,
+    state: State,
+) -> Result<State, FittingError> {
     let posed = body.pose(&state);
     let Some((cloud, reverse)) = around(&posed.points, scan, trust) else { return Ok(state) };
     let near = |p: &nalgebra::Point3<f32>| cloud.distance(p) < 0.5 * NEAR;
@@ -39,20 +85,20 @@ pub(crate) fn fit_fingers(
     if seen < LEAST_SEEN * body.areas.iter().sum::<f32>() {
         return Ok(state);
     }
-    let gate = Gate { distance: 0.02, slip: 0.008, min_cos: 0.4, kernel: 0.005, noise: 0.015 };
-    let joint = |j: &Joint| j.is_finger() || matches!(j, Joint::LeftHand | Joint::RightHand);
-    let joints = toile_character::joint::JOINTS.into_iter().filter(joint).collect();
+    let gate = Gate { distance: 0.02, slip: 0.008, min_cos: 0.4, kernel: 0.005, noise: turn.noise };
     let level = Level {
-        body: &body,
+        body,
         scan: &cloud,
         reverse: &reverse,
         gate,
-        columns: Columns::new(joints, 0),
+        columns: Columns::new(turn.joints, 0),
         iterations: 8,
-        shape_sigma: settings.shape_sigma,
+        shape_sigma: turn.shape_sigma,
         rooted: true,
     };
-    Ok(level.run(state, &JointPrior::standing(&model.mean_skeleton))?.state)
+    let before = matches(body, &posed, &cloud, &reverse, &gate).misfit;
+    let end = level.run(state.clone(), prior)?;
+    Ok(if end.matches.misfit <= before { end.state } else { state })
 }
 
 /// Scan samples near the hands, as the cloud and as what is looked up in the other direction.

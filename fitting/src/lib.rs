@@ -3,6 +3,7 @@
 //! - [`fit_body`]: shape and pose of one scan (Hu et al. 2017, eq. 4), conformation, stature and girths;
 //! - [`rig_scan`], [`rigged_scan`]: skin weights onto the scan itself;
 //! - [`pose_under`]: any skinned mesh posed inside a more dressed scan (eq. 5 and 6);
+//! - [`settle_under`]: the body in that pose, hands turned to the scan, drawn inside it;
 //! - [`measure()`]: stature and girths of a body at rest.
 //!
 //! A fit that should not be trusted is a result with a [`Verdict`]; having no answer is a [`FittingError`].
@@ -11,6 +12,7 @@ mod articulated;
 mod body_fit;
 mod cloud;
 mod conform;
+mod contain;
 mod correspond;
 mod equations;
 mod error;
@@ -21,6 +23,7 @@ mod prepare;
 mod prior;
 mod rig;
 mod settings;
+mod settle;
 mod stance;
 mod start;
 mod summary;
@@ -35,6 +38,7 @@ pub use measure::{Measurements, measure};
 pub use prepare::Mend;
 pub use rig::{rig_scan, rigged_scan};
 pub use settings::{ConformSettings, FitSettings, UnderSettings};
+pub use settle::{SettleReport, SettledBody, settle_under};
 pub use summary::{BodySummary, Theta};
 pub use under::{UnderFit, UnderReport, pose_under};
 pub use verdict::{DistanceStats, FitReport, Verdict};

@@ -169,8 +169,8 @@ impl UnderReport {
                 100.0 * self.uncovered
             ));
         }
-        if self.outside > 0.2 {
-            let failed = self.outside > 0.4;
+        if self.outside > 0.1 {
+            let failed = self.outside > 0.3;
             self.verdict = if failed { Verdict::Failed } else { Verdict::Doubtful };
             self.reasons.push(format!(
                 "{:.0} % of the mesh lies outside the scan: is it the same person, wearing one layer more?",

@@ -5,7 +5,7 @@ mod common;
 use common::{joint_distance, mean_distance, person};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use toile_character::{BodyModel, Joint, Pose, Region};
-use toile_fitting::{FittingError, UnderSettings, Verdict, pose_under};
+use toile_fitting::{FittingError, UnderSettings, Verdict, pose_under, settle_under};
 use toile_geometry::{Mesh, bvh::Bvh};
 
 /// The same person in the next take: stepped, turned, every joint a little different.
@@ -72,6 +72,55 @@ fn the_same_clothes_again_give_the_same_pose_again() {
     assert_eq!(fit.uncovered.len(), body.mesh.positions.len());
 }
 
+/// Part of `points` that lie more than `by` metres outside a closed mesh.
+fn outside(points: &[nalgebra::Point3<f32>], mesh: &Mesh, by: f32) -> f64 {
+    let bvh = Bvh::new(&mesh.positions, &mesh.triangles);
+    let is_out = |p: &&nalgebra::Point3<f32>| !bvh.contains(p) && bvh.closest(p, 1.0).is_some_and(|h| h.distance > by);
+    points.iter().filter(is_out).count() as f64 / points.len() as f64
+}
+
+#[test]
+fn a_settled_body_lies_inside_and_keeps_its_covered_skin() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 15, 10.0);
+    let body = model.skinned(&truth.beta);
+    let scan = dressed(&model, &truth.beta, &truth.pose, 0.012);
+    // the body was found 3 mm off; lips and lids stay, so the head does not count
+    let off = truth.pose.moved(&Isometry3::translation(0.0, 0.0, 0.003), &body.skeleton);
+    let before = body.posed(&off);
+    let settled = settle_under(&model, &body, &off, &scan).unwrap();
+    let skin = |points: &[nalgebra::Point3<f32>]| -> Vec<_> {
+        points.iter().zip(&model.regions).filter(|(_, r)| **r != Region::Head).map(|(p, _)| *p).collect()
+    };
+    let (was, is) = (outside(&skin(&before), &scan, 0.002), outside(&skin(&settled.mesh.positions), &scan, 0.002));
+    assert!(was > 0.1 && is < 0.01, "outside {was} before, {is} after");
+    // at the ankles the dents of the feet fade out
+    let legs = |v: &usize| matches!(model.regions[*v], Region::LeftLeg | Region::RightLeg);
+    let moved = (0..before.len()).filter(legs).filter(|&v| (before[v] - settled.mesh.positions[v]).norm() > 0.001);
+    let (moved, all) = (moved.count(), (0..before.len()).filter(legs).count());
+    assert!(moved * 10 < all, "{moved} of {all} covered vertices moved");
+    assert!(settled.report.moved_most_mm < 10.0, "{:?}", settled.report);
+}
+
+#[test]
+fn a_wrist_that_turned_since_the_last_take_is_turned_again() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 16, 0.0);
+    let body = model.skinned(&truth.beta);
+    let mut next = truth.pose.clone();
+    let wrist = next.rotation_mut(Joint::LeftHand);
+    *wrist = UnitQuaternion::from_scaled_axis(Vector3::z() * 0.05) * *wrist;
+    let scan = dressed(&model, &truth.beta, &next, 0.01);
+    let settled = settle_under(&model, &body, &truth.pose, &scan).unwrap();
+    let tip = model.landmark("leftMiddleFingerTip").unwrap() as usize;
+    let at = |pose: &Pose| body.posed(pose)[tip];
+    let (was, is) = ((at(&truth.pose) - at(&next)).norm(), (at(&settled.pose) - at(&next)).norm());
+    assert!(was > 0.006 && is < 0.3 * was, "{is} of {was} m left");
+    let other = Mesh::new(vec![nalgebra::Point3::origin(); 3], vec![[0, 1, 2]]);
+    let wrong = toile_character::SkinnedMesh { mesh: other, ..body };
+    assert!(settle_under(&model, &wrong, &truth.pose, &scan).unwrap_err().to_string().contains("template"));
+}
+
 #[test]
 fn a_smaller_person_is_no_match() {
     let model = BodyModel::load_default().unwrap();
@@ -92,7 +141,9 @@ fn one_and_two_threads_give_the_same_bits() {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let settings = UnderSettings::default();
-        pool.install(|| pose_under(&body, &[], &truth.pose, &scan, &settings, &|_| {})).unwrap().pose
+        let pose = pool.install(|| pose_under(&body, &[], &truth.pose, &scan, &settings, &|_| {})).unwrap().pose;
+        let settled = pool.install(|| settle_under(&model, &body, &pose, &scan)).unwrap();
+        (settled.pose, settled.mesh.positions)
     };
     assert_eq!(run(1), run(2));
 }

@@ -115,7 +115,7 @@ fn dress(
     let body = body_file::Body::load(&run.folders, run.first_layer(), model)?;
     for n in 1..run.layers.len() {
         let layer = run.layers[n].clone();
-        summary.add(&layer, "pose", pose::run(run, n, &body)?);
+        summary.add(&layer, "pose", pose::run(run, n, &body, model)?);
         match cut::run(run, n, &body) {
             Ok(record) => summary.add(&layer, "cut", record),
             Err(error @ StudioError::NothingNew { .. }) => {

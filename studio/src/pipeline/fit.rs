@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Raised whenever the same scan and settings give another body.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
 

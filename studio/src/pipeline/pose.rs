@@ -2,7 +2,9 @@
 //!
 //! Reads the scan, the scan of the take before with its pose, and the body. Writes `pose.json` and `body.ply`.
 
-use toile_fitting::{UnderFit, UnderSettings, Verdict, pose_under, rigged_scan};
+use serde_json::json;
+use toile_character::BodyModel;
+use toile_fitting::{UnderFit, UnderSettings, Verdict, pose_under, rigged_scan, settle_under};
 use toile_geometry::{Mesh, ply};
 
 use crate::{
@@ -15,7 +17,7 @@ use crate::{
 };
 
 /// Raised whenever the same inputs and settings give another pose.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Expected seconds.
 pub const COST: f64 = 2.0;
 
@@ -23,7 +25,7 @@ pub const COST: f64 = 2.0;
 ///
 /// # Errors
 /// [`StudioError`] where the dressed person cannot be found in the scan, or files cannot be read or written.
-pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
+pub fn run(run: &Run, n: usize, body: &Body, model: &BodyModel) -> Result<Record, StudioError> {
     let folders = &run.folders;
     let (layer, before) = (run.layers[n].as_str(), run.layers[n - 1].as_str());
     let settings = UnderSettings::default();
@@ -56,11 +58,15 @@ pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
                 format!("the person of the take before was not found in it: {}", fit.report.reasons.join("; "));
             return Err(StudioError::stage(&scan_path, reason));
         }
-        let posed = ply::encode(&body.skinned.posed_mesh(&fit.pose));
+        let settled =
+            settle_under(model, &body.skinned, &fit.pose, &scan).map_err(|e| StudioError::stage(&scan_path, e))?;
         Ok(Product {
-            files: vec![(pose_path.clone(), pose_bytes(&fit.pose)?), (body_path.clone(), posed)],
+            files: vec![
+                (pose_path.clone(), pose_bytes(&settled.pose)?),
+                (body_path.clone(), ply::encode(&settled.mesh)),
+            ],
             warnings: warnings(layer, &fit),
-            result: plain(&fit.report)?,
+            result: json!({ "pose": plain(&fit.report)?, "settle": plain(&settled.report)? }),
             ..Product::default()
         })
     })
