@@ -7,7 +7,7 @@ use toile_geometry::{
     triangle::ray_hit,
 };
 
-use crate::{ExtractSettings, labels::Labels, scan_graph::ScanGraph};
+use crate::{ExtractSettings, evidence::Evidence, labels::Labels, scan_graph::ScanGraph};
 
 /// An island of old surface inside the garment is turned new up to this share of `least_area`, whatever it says.
 const ISLAND_SHARE: f32 = 0.2;
@@ -15,6 +15,10 @@ const ISLAND_SHARE: f32 = 0.2;
 const MOST_RIM_VERTICES: usize = 450;
 /// A patch or hole belongs to the garment when this share of its surroundings does.
 const SURROUNDED: f64 = 0.95;
+/// Closed by fusion and within this angle (cosine) of what was worn before, a patch may be cloth: a membrane is not.
+const ALONG: f32 = 0.8;
+/// A membrane spans hollows: cloth that nobody saw is believed up to this height over what was worn before, metres.
+const NEAR: f32 = 0.05;
 
 /// Labels with small islands of either kind turned over, and of the garment's pieces only the large ones kept.
 /// Returns how many pieces are left.
@@ -41,9 +45,17 @@ fn flip(labels: &mut Labels, v: usize) {
     labels.confidence[v] = 0.5;
 }
 
-/// Filled vertices take part in the garment only where a patch of them is surrounded by it and no bone passes through:
-/// below a skirt's hem and in a collar the scan is closed by a membrane that is no cloth.
-pub fn settle_filled(scan: &Mesh, graph: &ScanGraph, labels: &mut Labels, bones: &[[Point3<f32>; 2]]) {
+/// Filled vertices take part in the garment only where no bone passes through their patch: below a skirt's hem and in a
+/// collar the scan is closed by a membrane that is no cloth. A patch that the garment surrounds belongs to it; of one
+/// that it shares with its surroundings (on top of a shoulder, beside the neck) those vertices stay that were labelled so
+/// and lie along what was worn before.
+pub fn settle_filled(
+    scan: &Mesh,
+    graph: &ScanGraph,
+    evidence: &Evidence,
+    labels: &mut Labels,
+    bones: &[[Point3<f32>; 2]],
+) {
     let filled = |v: usize| graph.filled[v] > 0.5;
     let (patch, areas) = graph.components(filled);
     let mut around = vec![[0u32; 2]; areas.len()];
@@ -62,7 +74,8 @@ pub fn settle_filled(scan: &Mesh, graph: &ScanGraph, labels: &mut Labels, bones:
     for v in (0..graph.len()).filter(|&v| filled(v)) {
         let [old, new] = around[patch[v] as usize];
         let surrounded = f64::from(new) > SURROUNDED * f64::from(old + new);
-        labels.garment[v] = surrounded && !passed[patch[v] as usize];
+        let along = evidence.facing[v] > ALONG && evidence.height[v].abs() < NEAR;
+        labels.garment[v] = !passed[patch[v] as usize] && (surrounded || (labels.garment[v] && along));
     }
 }
 

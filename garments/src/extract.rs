@@ -137,7 +137,7 @@ pub fn extract(
     let (garment_type, mut labels) = label(take, &graph, &evidence, settings);
     clean::drop_islands(&graph, &mut labels, settings);
     take_off_steps(take, &graph, &evidence, &mut labels, settings);
-    clean::settle_filled(take.scan, &graph, &mut labels, &bones(take));
+    clean::settle_filled(take.scan, &graph, &evidence, &mut labels, &bones(take));
     let pieces = clean::drop_islands(&graph, &mut labels, settings);
     progress(0.6);
     let in_take = garment_mesh(take, &graph, &labels, settings);
