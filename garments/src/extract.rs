@@ -17,6 +17,7 @@ use crate::{
     evidence::{self, Evidence},
     hem,
     labels::{self, Labels},
+    rim,
     scan_graph::ScanGraph,
     untangle,
 };
@@ -31,6 +32,10 @@ const SUNKEN_AREA: f32 = 0.03;
 const FOLLOWS: f32 = 0.06;
 /// New cloth on this share of the inner thighs goes around each leg by itself.
 pub(crate) const LEGS_APART: f32 = 0.2;
+/// Attribute of the scan that tells where nothing was seen beyond.
+const FREE: &str = "unseen_around";
+/// Rims with fewer vertices are small holes, and left as they are.
+const LEAST_RIM: usize = 20;
 /// Labels less sure than this are marked as unsure.
 const UNSURE: f32 = 0.7;
 
@@ -136,6 +141,7 @@ pub fn extract(
     progress(0.3);
     let (garment_type, mut labels) = label(take, &graph, &evidence, settings);
     clean::drop_islands(&graph, &mut labels, settings);
+    clean::settle_filled(take.scan, &graph, &evidence, &mut labels, &bones(take));
     take_off_steps(take, &graph, &evidence, &mut labels, settings);
     clean::settle_filled(take.scan, &graph, &evidence, &mut labels, &bones(take));
     let pieces = clean::drop_islands(&graph, &mut labels, settings);
@@ -291,15 +297,35 @@ fn garment_mesh(take: &Take, graph: &ScanGraph, labels: &Labels, settings: &Extr
     scan.attributes.retain(|name, _| name == "filled");
     scan.attributes.entry("filled".into()).or_insert_with(|| vec![0.0; graph.len()]);
     scan.attributes.insert("confidence".into(), labels.confidence.clone());
+    scan.attributes.insert(FREE.into(), unseen_around(graph, take.scan));
     let bones = bones(take);
     clean::close_hidden(&mut scan, &labels.garment, &bones);
     let mut mesh = cut::cut_positive(&scan, &field);
     mesh = clean::keep_large_pieces(&mesh, settings.piece_share);
     clean::fill_holes(&mut mesh, &bones, settings.hole_rim);
+    rim::extend(&mut mesh, FREE, settings.edge_loss);
+    mesh.attributes.remove(FREE);
     mesh = remesh::isotropic(&mesh, settings.edge_length);
+    rim::smooth(&mut mesh, settings.rim_smoothing, LEAST_RIM);
     untangle::untangle(&mut mesh);
     mesh.recompute_normals();
     mesh
+}
+
+/// 1 where the scan ends or was closed without being seen, less around it.
+fn unseen_around(graph: &ScanGraph, scan: &Mesh) -> Vec<f32> {
+    let open = graph.open_vertices(scan);
+    let mut unseen: Vec<f32> = (0..graph.len()).map(|v| if open[v] { 1.0 } else { graph.filled[v] }).collect();
+    for _ in 0..2 {
+        unseen = (0..graph.len())
+            .map(|v| {
+                let around = graph.neighbors.of(v);
+                let mean = around.iter().map(|&n| unseen[n as usize]).sum::<f32>() / around.len().max(1) as f32;
+                unseen[v].max(mean)
+            })
+            .collect();
+    }
+    unseen
 }
 
 /// Segments from each joint to its parent.

@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use nalgebra::{Point3, Vector3};
 use toile_geometry::Mesh;
 
 use crate::{ExtractSettings, evidence::Evidence, labels::Labels, scan_graph::ScanGraph};
@@ -23,6 +24,14 @@ const SLOPE_ODDS: f32 = -2.0;
 const SLOPE_WIDTH: f32 = 0.5;
 /// Quantile of the heights beyond the slope that counts as the cloth's height.
 const PLATEAU: f32 = 0.6;
+/// Lips are looked for within this share of the greatest depth of a step; the cloth is read beyond it.
+const LIP_WIDTH: f32 = 0.7;
+/// A lip's normal is further than this (cosine) from the cloth's.
+const LIP_FACING: f32 = 0.7;
+/// A lip lies at least this far below the cloth's plane, metres.
+const LIP_DROP: f32 = 0.002;
+/// Cloth behind a hem must have this area to be believed, square metres.
+const LEAST_BEHIND: f32 = 5e-5;
 
 /// Lowers the log odds of the steps at the garment's border.
 pub fn lower_steps(
@@ -37,7 +46,8 @@ pub fn lower_steps(
     let reached = border_distance(scan, graph, labels, depth);
     let steps = step_vertices(graph, evidence, labels, color_odds, &reached);
     let slopes = slope_vertices(scan, graph, evidence, labels, &reached, depth);
-    for v in steps.into_iter().chain(slopes) {
+    let lips = lip_vertices(scan, graph, labels, &reached, depth);
+    for v in steps.into_iter().chain(slopes).chain(lips) {
         labels.log_odds[v as usize] = labels.log_odds[v as usize].min(SLOPE_ODDS);
     }
 }
@@ -132,23 +142,63 @@ fn heights_around(
     center: u32,
     radius: f32,
 ) -> Vec<f32> {
+    let beyond = |v: &u32| reached[*v as usize] > SLOPE_WIDTH * radius && evidence.height[*v as usize].is_finite();
+    let near = around(scan, graph, labels, center, radius);
+    near.into_iter().filter(beyond).map(|v| evidence.height[v as usize]).collect()
+}
+
+/// The garment's vertices within `radius` of `center` that are connected to it there.
+fn around(scan: &Mesh, graph: &ScanGraph, labels: &Labels, center: u32, radius: f32) -> Vec<u32> {
     let origin = scan.positions[center as usize];
     let mut visited = std::collections::BTreeSet::from([center]);
-    let mut stack = vec![center];
-    let mut heights = Vec::new();
-    while let Some(v) = stack.pop() {
-        let height = evidence.height[v as usize];
-        if reached[v as usize] > SLOPE_WIDTH * radius && height.is_finite() {
-            heights.push(height);
-        }
-        for &n in graph.neighbors.of(v as usize) {
+    let mut found = vec![center];
+    let mut next = 0;
+    while next < found.len() {
+        for &n in graph.neighbors.of(found[next] as usize) {
             let near = (scan.positions[n as usize] - origin).norm() < radius;
             if near && labels.garment[n as usize] && visited.insert(n) {
-                stack.push(n);
+                found.push(n);
             }
         }
+        next += 1;
     }
-    heights
+    found
+}
+
+/// Vertices near the border that lie past a fold: below the plane of the cloth further in and turned away from it. A
+/// fused scan closes the space behind a hanging hem by such a lip.
+fn lip_vertices(scan: &Mesh, graph: &ScanGraph, labels: &Labels, reached: &[f32], depth: f32) -> Vec<u32> {
+    let turned = |&v: &u32| {
+        let v = v as usize;
+        if !(labels.garment[v] && reached[v] < LIP_WIDTH * depth) {
+            return false;
+        }
+        let Some((center, normal)) = cloth_behind(scan, graph, labels, reached, v as u32, depth) else { return false };
+        graph.normals[v].dot(&normal) < LIP_FACING && (scan.positions[v] - center).dot(&normal) < -LIP_DROP
+    };
+    (0..graph.len() as u32).filter(turned).collect()
+}
+
+/// Middle and normal of the cloth between half and the whole of `radius` from the border, around `center`.
+fn cloth_behind(
+    scan: &Mesh,
+    graph: &ScanGraph,
+    labels: &Labels,
+    reached: &[f32],
+    center: u32,
+    radius: f32,
+) -> Option<(Point3<f32>, Vector3<f32>)> {
+    let (mut area, mut sum, mut normal) = (0.0, Vector3::zeros(), Vector3::zeros());
+    for v in around(scan, graph, labels, center, radius).into_iter().map(|v| v as usize) {
+        if reached[v] > LIP_WIDTH * radius {
+            area += graph.areas[v];
+            sum += scan.positions[v].coords * graph.areas[v];
+            normal += graph.normals[v] * graph.areas[v];
+        }
+    }
+    // Cloth that is itself bent all ways tells no direction.
+    let told = normal.norm() > 0.7 * area && area > LEAST_BEHIND;
+    told.then(|| (Point3::from(sum / area), normal.normalize()))
 }
 
 fn quantile(mut values: Vec<f32>, share: f32) -> Option<f32> {

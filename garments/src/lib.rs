@@ -5,7 +5,7 @@
 //! 1. [`evidence`]: how far each scan vertex stands off what was worn before, how its colour differs, and where on
 //!    the body it lies;
 //! 2. [`labels`]: new garment or not, one energy over the scan's surface, minimised globally by a graph cut;
-//! 3. [`hem`], [`cut`] and [`clean`]: the garment's own mesh, cut through triangles along a smooth hem, islands dropped, holes
+//! 3. [`hem`], [`cut`], [`clean`] and [`rim`]: the garment's own mesh, cut through triangles along a smooth hem, islands dropped, holes
 //!    closed;
 //! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
 //! 5. [`mod@stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests.
@@ -30,6 +30,7 @@ pub mod hem;
 pub mod labels;
 pub mod lower_surface;
 pub mod push;
+pub mod rim;
 pub mod scan_graph;
 pub mod settings;
 pub mod stack;
