@@ -15,8 +15,9 @@ without depth edges (50 mm), as Toile drops edges itself. Voxels 4 mm, truncatio
 
 What is printed: CPU milliseconds a frame (process time, median; reading images, cutting, edge filter and extraction are not in it),
 the ratio to Open3D legacy, mean distance of the surface to the truth, and how much of the truth that some frame sees lies within
-5 mm of the surface. Toile's rows come from its timings.json: `integrate` is the volume update alone, `all steps` adds filter, cut
-and normals. Tracking rows end with the drift at the body's centre after the last frame. Files: target/peers/.
+5 mm of the surface (Toile's is the finished scan with its filled holes; what stands on the disk is not scored). Toile's times
+come from its timings.json: `integrate` is the volume update alone, `all steps` adds filter, cut and normals. Tracking rows end with
+the drift at the body's centre after the last frame. Files: target/peers/.
 """
 import argparse
 import json

@@ -122,14 +122,10 @@ def toile_known(take, toile, out, with_color, steps):
     import open3d as o3d
     if with_color and not take.color:
         raise RuntimeError("the frames have no colour")
-    scan, timings = toile_run(take, toile, out, with_color, ["--volume", "all", "--poses", str(out / "poses.txt")])
+    scan, timings = toile_run(take, toile, out, with_color, ["--poses", str(out / "poses.txt")])
     ms = sum(timings[s]["cpu_median_ms"] for s in steps if s in timings)
     mesh = o3d.t.io.read_triangle_mesh(str(scan / "scan.ply"))
-    triangles = mesh.triangle.indices.numpy()
-    if "filled" in mesh.vertex:
-        measured = mesh.vertex["filled"].numpy().ravel() == 0
-        triangles = triangles[measured[triangles].all(1)]
-    return {"ms": ms, **frames.score(take, mesh.vertex.positions.numpy().astype(float), triangles)}
+    return {"ms": ms, **frames.score(take, mesh.vertex.positions.numpy().astype(float), mesh.triangle.indices.numpy())}
 
 
 def toile_tracking(take, toile, out):
