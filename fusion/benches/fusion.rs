@@ -1,14 +1,18 @@
 //! Benchmarks of the fusion stage on generated frames (a figure of capsules that turns on a disk before a wall); cases are
-//! named stage/case/size. Run with `RAYON_NUM_THREADS=1` for the figures of one thread.
+//! named stage/case/size. Measured is the processor time of all threads, so that other work on the machine matters little;
+//! with `RAYON_NUM_THREADS=1` that is what one thread needs.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 #[path = "../src/test_scene.rs"]
 #[allow(dead_code, unreachable_pub)]
 mod test_scene;
 
-use std::{cell::Cell, hint::black_box};
+use std::{cell::Cell, hint::black_box, time::Duration};
 
-use criterion::{BatchSize, Bencher, Criterion, criterion_group, criterion_main};
+use criterion::{
+    BatchSize, Bencher, Criterion, criterion_group, criterion_main,
+    measurement::{Measurement, ValueFormatter, WallTime},
+};
 use test_scene::{Memory, Scene, steps};
 use toile_capture::Frame;
 use toile_fusion::{
@@ -31,6 +35,39 @@ const FRAMES: usize = 12;
 const STEP_DEG: f64 = 4.0;
 /// Frames and degrees between them of a whole take.
 const TAKE: (usize, f64) = (60, 6.1);
+
+/// Processor time of this process.
+struct CpuTime;
+
+impl Measurement for CpuTime {
+    type Intermediate = Duration;
+    type Value = Duration;
+
+    fn start(&self) -> Duration {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
+    }
+
+    fn end(&self, start: Duration) -> Duration {
+        self.start() - start
+    }
+
+    fn add(&self, a: &Duration, b: &Duration) -> Duration {
+        *a + *b
+    }
+
+    fn zero(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn to_f64(&self, value: &Duration) -> f64 {
+        WallTime.to_f64(value)
+    }
+
+    fn formatter(&self) -> &dyn ValueFormatter {
+        const { &WallTime }.formatter()
+    }
+}
 
 /// Frames of one image size with their true poses.
 struct Material {
@@ -74,7 +111,7 @@ impl Material {
 }
 
 /// Times one frame after the other.
-fn each<T>(b: &mut Bencher<'_>, mut run: impl FnMut(usize) -> T) {
+fn each<T>(b: &mut Bencher<'_, CpuTime>, mut run: impl FnMut(usize) -> T) {
     let next = Cell::new(0);
     b.iter(|| {
         let i = next.replace((next.get() + 1) % FRAMES);
@@ -83,7 +120,7 @@ fn each<T>(b: &mut Bencher<'_>, mut run: impl FnMut(usize) -> T) {
 }
 
 /// One case a step of a frame.
-fn steps_of_a_frame(c: &mut Criterion, m: &Material) {
+fn steps_of_a_frame(c: &mut Criterion<CpuTime>, m: &Material) {
     let mut group = c.benchmark_group("fusion");
     group.sample_size(20);
     let settings = FusionSettings::default();
@@ -116,7 +153,7 @@ fn steps_of_a_frame(c: &mut Criterion, m: &Material) {
 }
 
 /// Frames pushed one by one, and a whole take from frames in memory to the finished scan.
-fn takes(c: &mut Criterion, m: &Material) {
+fn takes(c: &mut Criterion<CpuTime>, m: &Material) {
     let mut group = c.benchmark_group("fusion");
     group.sample_size(10);
     let settings = FusionSettings::default();
@@ -134,7 +171,7 @@ fn takes(c: &mut Criterion, m: &Material) {
     group.finish();
 }
 
-fn benches(c: &mut Criterion) {
+fn benches(c: &mut Criterion<CpuTime>) {
     for (width, height, focal) in [(512, 424, 365.0), (640, 480, 525.0)] {
         let material = Material::new(width, height, focal);
         steps_of_a_frame(c, &material);
@@ -142,5 +179,5 @@ fn benches(c: &mut Criterion) {
     }
 }
 
-criterion_group!(fusion, benches);
+criterion_group! { name = fusion; config = Criterion::default().with_measurement(CpuTime); targets = benches }
 criterion_main!(fusion);
