@@ -71,6 +71,9 @@ fn part_fans(mesh: Mesh) -> Mesh {
     let mut triangles = mesh.triangles.clone();
     let mut source: Vec<u32> = (0..mesh.positions.len() as u32).collect();
     for v in 0..mesh.positions.len() {
+        if is_one_fan(&mesh.triangles, around.of(v), v as u32) {
+            continue;
+        }
         let fans = fans(&mesh.triangles, around.of(v), v as u32);
         for fan in fans.iter().skip(1) {
             let copy = source.len() as u32;
@@ -85,6 +88,32 @@ fn part_fans(mesh: Mesh) -> Mesh {
         }
     }
     if source.len() == mesh.positions.len() { mesh } else { mesh.gather(&source, triangles) }
+}
+
+/// True where a walk over shared edges from the first of a vertex's triangles reaches all; false where not, or where
+/// there are too many to tell fast.
+fn is_one_fan(triangles: &[[u32; 3]], around: &[u32], v: u32) -> bool {
+    if around.len() > 64 {
+        return false;
+    }
+    let ends = |k: usize| {
+        let tri = triangles[around[k] as usize];
+        let at = tri.iter().position(|&c| c == v).unwrap_or(0);
+        [tri[(at + 1) % 3], tri[(at + 2) % 3]]
+    };
+    let all = u64::MAX.checked_shr(64 - around.len() as u32).unwrap_or(0);
+    let (mut reached, mut last) = (all & 1, if around.is_empty() { [v; 2] } else { ends(0) });
+    // Around a closed fan every step finds the next triangle; a second way round serves open ones.
+    for side in [1, 0] {
+        while reached != all {
+            let next = (0..around.len()).find(|&k| reached >> k & 1 == 0 && ends(k).contains(&last[side]));
+            let Some(k) = next else { break };
+            reached |= 1 << k;
+            let [a, b] = ends(k);
+            last[side] = if a == last[side] { b } else { a };
+        }
+    }
+    reached == all
 }
 
 /// Groups of a vertex's triangles that hang together by edges at the vertex.
@@ -139,6 +168,26 @@ mod tests {
         let (largest, count) = largest_component(&parted);
         assert_eq!((largest.positions.len(), count), (3, 2));
         assert!((largest.area() - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn fans_are_told_apart_whatever_the_order_of_their_triangles() {
+        // Around vertex 0: a closed fan of six, an open one of three, and both together.
+        let closed: Vec<[u32; 3]> = (0..6).map(|k| [0, 1 + k, 1 + (k + 1) % 6]).collect();
+        let open: Vec<[u32; 3]> = (0..3).map(|k| [0, 10 + k, 11 + k]).collect();
+        for turn in 0..6 {
+            let mut one = closed.clone();
+            one.rotate_left(turn);
+            one.swap(1, 4);
+            let mut part = open.clone();
+            part.rotate_left(turn % 3);
+            let both: Vec<[u32; 3]> = one.iter().chain(&part).copied().collect();
+            for (triangles, expected) in [(one, 1), (part, 1), (both, 2)] {
+                let around: Vec<u32> = (0..triangles.len() as u32).collect();
+                assert_eq!(is_one_fan(&triangles, &around, 0), expected == 1, "{triangles:?}");
+                assert_eq!(fans(&triangles, &around, 0).len(), expected, "{triangles:?}");
+            }
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::{
     Mesh, polygon,
-    topology::{boundary_loops, loop_length},
+    topology::{VertexTriangles, boundary_loops, loop_length},
 };
 
 mod patch;
@@ -34,19 +34,20 @@ pub struct Filled {
 }
 
 /// Closes every hole whose border is at most `max_length` long (metres); borders up to `plate_length` are closed by a
-/// thin plate that continues the surroundings, longer ones by a surface of least area. New vertices get the attribute [`FILLED`] = 1 (old
-/// ones 0), and colours and attributes that run on smoothly from the border. The mesh must be a manifold
-/// ([`crate::components::make_manifold`]). Normals are computed anew where there were any.
+/// thin plate that continues the surroundings, longer ones by a taut membrane. New vertices get the attribute
+/// [`FILLED`] = 1 (old ones 0), and colours and attributes that run on smoothly from the border. The mesh must be a
+/// manifold ([`crate::components::make_manifold`]). Normals are computed anew where there were any.
 pub fn fill_holes(mesh: &Mesh, max_length: f32, plate_length: f32) -> (Mesh, Filled) {
     let mut out = mesh.clone();
     out.attributes.entry(FILLED.into()).or_insert_with(|| vec![0.0; mesh.positions.len()]);
     let loops: Vec<Vec<u32>> =
         boundary_loops(&mesh.triangles).into_iter().flat_map(split_at_repeats).filter(|l| l.len() > 2).collect();
     let taken = border_edges(mesh, &loops);
+    let around = VertexTriangles::new(mesh.positions.len(), &mesh.triangles);
     let mut filled = Filled::default();
-    let patches: Vec<Option<(Vec<u32>, Option<Patch>)>> =
-        loops.par_iter().map(|border| close(mesh, border, &taken, max_length, plate_length)).collect();
-    for (border, patch) in patches.into_iter().flatten() {
+    let patches: Vec<(Vec<u32>, Option<Patch>)> =
+        loops.par_iter().filter_map(|l| close(mesh, &around, l, &taken, max_length, plate_length)).collect();
+    for (border, patch) in patches {
         match patch {
             Some(patch) => {
                 append(&mut out, &border, &patch);
@@ -65,6 +66,7 @@ pub fn fill_holes(mesh: &Mesh, max_length: f32, plate_length: f32) -> (Mesh, Fil
 /// The border in the patch's direction and its patch, if there is one; `None` where the border is too long.
 fn close(
     mesh: &Mesh,
+    around: &VertexTriangles,
     border: &[u32],
     taken: &BTreeSet<(u32, u32)>,
     max_length: f32,
@@ -81,9 +83,10 @@ fn close(
     let patch = polygon::triangulate(&points, &blocked).map(|triangles| {
         let mut patch = Patch::new(points, triangles);
         patch.refine(&blocked);
+        patch.tighten();
         if length <= plate_length {
             let flat = patch.clone();
-            relax::relax(&mut patch, mesh, &reversed);
+            relax::relax(&mut patch, mesh, around, &reversed);
             if patch.area() > MOST_BULGE * flat.area() {
                 patch = flat;
             }
@@ -127,8 +130,9 @@ fn append(mesh: &mut Mesh, border: &[u32], patch: &Patch) {
         mesh.normals.resize(mesh.positions.len(), nalgebra::Vector3::zeros());
     }
     let weights = relax::border_weights(patch, border.len());
-    let blend =
-        |values: &dyn Fn(u32) -> f64, row: &[f64]| -> f64 { row.iter().zip(border).map(|(w, &v)| w * values(v)).sum() };
+    let blend = |values: &dyn Fn(u32) -> f64, row: &[(u32, f64)]| -> f64 {
+        row.iter().map(|&(k, w)| w * values(border[k as usize])).sum()
+    };
     for row in weights.iter().take(inner) {
         if !mesh.colors.is_empty() {
             let color =

@@ -16,23 +16,39 @@ pub struct Edges {
 impl Edges {
     /// Collects the edges of `triangles`.
     pub fn new(triangles: &[[u32; 3]]) -> Self {
-        let mut sides: Vec<([u32; 2], u32)> = Vec::with_capacity(triangles.len() * 3);
-        for (t, tri) in triangles.iter().enumerate() {
-            for k in 0..3 {
-                let (a, b) = (tri[k], tri[(k + 1) % 3]);
-                sides.push(([a.min(b), a.max(b)], (t * 3 + k) as u32));
-            }
+        let count = triangles.as_flattened().iter().max().map_or(0, |&v| v as usize + 1);
+        let ends = |side: usize| {
+            let (tri, k) = (triangles[side / 3], side % 3);
+            let (a, b) = (tri[k], tri[(k + 1) % 3]);
+            [a.min(b), a.max(b)]
+        };
+        // Sides in compressed rows by their smaller vertex; rows are short and sorted one by one.
+        let mut starts = vec![0u32; count + 1];
+        (0..triangles.len() * 3).for_each(|side| starts[ends(side)[0] as usize + 1] += 1);
+        (0..count).for_each(|v| starts[v + 1] += starts[v]);
+        let mut fill = starts.clone();
+        let mut sides = vec![(0u32, 0u32); triangles.len() * 3];
+        for side in 0..sides.len() {
+            let [a, b] = ends(side);
+            sides[fill[a as usize] as usize] = (b, side as u32);
+            fill[a as usize] += 1;
         }
-        sides.sort_unstable();
         let mut edges = Self { of_triangle: vec![[0; 3]; triangles.len()], ..Self::default() };
-        for (pair, side) in sides {
-            if edges.vertices.last() != Some(&pair) {
-                edges.vertices.push(pair);
-                edges.uses.push(0);
+        edges.vertices.reserve(sides.len() / 2 + 1);
+        edges.uses.reserve(sides.len() / 2 + 1);
+        for a in 0..count {
+            let row = &mut sides[starts[a] as usize..starts[a + 1] as usize];
+            row.sort_unstable();
+            for &(b, side) in row.iter() {
+                let pair = [a as u32, b];
+                if edges.vertices.last() != Some(&pair) {
+                    edges.vertices.push(pair);
+                    edges.uses.push(0);
+                }
+                let e = edges.vertices.len() - 1;
+                edges.uses[e] += 1;
+                edges.of_triangle[side as usize / 3][side as usize % 3] = e as u32;
             }
-            let e = edges.vertices.len() - 1;
-            edges.uses[e] += 1;
-            edges.of_triangle[side as usize / 3][side as usize % 3] = e as u32;
         }
         edges
     }
@@ -211,5 +227,27 @@ mod tests {
         assert_eq!(vertex_components(5, &triangles), (vec![0, 0, 0, 0, 1], 2));
         assert_eq!(VertexNeighbors::new(4, &triangles).of(0), &[1, 2, 3]);
         assert_eq!(VertexTriangles::new(4, &triangles).of(2), &[0, 1]);
+    }
+
+    #[test]
+    fn edges_agree_with_brute_force_on_a_tangle() {
+        let mut seed = 7u32;
+        let mut vertex = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            seed >> 28
+        };
+        let triangles: Vec<[u32; 3]> = (0..90).map(|_| [vertex(), vertex() + 16, vertex() + 32]).collect();
+        let mut uses: std::collections::BTreeMap<[u32; 2], u32> = std::collections::BTreeMap::new();
+        for [a, b, c] in &triangles {
+            [[*a, *b], [*b, *c], [*a, *c]].into_iter().for_each(|e| *uses.entry(e).or_default() += 1);
+        }
+        let edges = Edges::new(&triangles);
+        assert_eq!(edges.vertices, uses.keys().copied().collect::<Vec<_>>());
+        assert_eq!(edges.uses, uses.values().copied().collect::<Vec<_>>());
+        for (tri, sides) in triangles.iter().zip(&edges.of_triangle) {
+            let ends = [[tri[0], tri[1]], [tri[1], tri[2]], [tri[0], tri[2]]];
+            assert_eq!(sides.map(|e| edges.vertices[e as usize]), ends);
+        }
+        assert!(Edges::new(&[]).vertices.is_empty());
     }
 }

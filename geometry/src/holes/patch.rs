@@ -1,13 +1,17 @@
 //! A patch in a hole: its border comes first and stays; edges are split and flipped until it is evenly meshed.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use nalgebra::Point3;
+
+use crate::topology::{Edges, VertexNeighbors};
 
 /// Rounds of splitting and flipping.
 const ROUNDS: usize = 12;
 /// An inner edge longer than this many border edges is split.
 const LONG: f64 = 1.5;
+/// Passes of tightening.
+const TIGHTENING: usize = 200;
 /// Most vertices of a patch.
 const MOST_VERTICES: usize = 20_000;
 
@@ -39,12 +43,17 @@ impl Patch {
                 }
             }
             if split > 0 {
-                self.even_out();
+                self.even_out(3);
             }
             if split == 0 && flips == 0 || self.positions.len() > MOST_VERTICES {
                 break;
             }
         }
+    }
+
+    /// Draws the inner vertices to where they balance: a membrane without the ridges of a coarse triangulation.
+    pub(super) fn tighten(&mut self) {
+        self.even_out(TIGHTENING);
     }
 
     /// Total area.
@@ -61,23 +70,18 @@ impl Patch {
         (0..n).map(|i| (self.positions[i] - self.positions[(i + 1) % n]).norm()).sum::<f64>() / n.max(1) as f64
     }
 
-    /// Inner edges with their two triangles.
-    fn inner_edges(&self) -> BTreeMap<(u32, u32), [usize; 2]> {
-        let mut sides: BTreeMap<(u32, u32), [usize; 2]> = BTreeMap::new();
-        for (t, tri) in self.triangles.iter().enumerate() {
-            for k in 0..3 {
-                let (a, b) = (tri[k], tri[(k + 1) % 3]);
-                sides.entry((a.min(b), a.max(b))).and_modify(|s| s[1] = t).or_insert([t, usize::MAX]);
-            }
-        }
-        sides.retain(|_, s| s[1] != usize::MAX);
-        sides
+    /// Inner edges with their two triangles, ascending.
+    fn inner_edges(edges: &Edges) -> impl Iterator<Item = ((u32, u32), [usize; 2])> {
+        let sides = edges.triangles();
+        let inner = (0..sides.len()).filter(|&e| edges.uses[e] == 2);
+        inner.map(move |e| ((edges.vertices[e][0], edges.vertices[e][1]), sides[e].map(|t| t as usize)))
     }
 
     fn split_long(&mut self, target: f64) -> usize {
         let length = |e: &(u32, u32)| (self.positions[e.0 as usize] - self.positions[e.1 as usize]).norm();
+        let edges = Edges::new(&self.triangles);
         let mut long: Vec<(f64, (u32, u32), [usize; 2])> =
-            self.inner_edges().into_iter().map(|(e, t)| (length(&e), e, t)).filter(|l| l.0 > target).collect();
+            Self::inner_edges(&edges).map(|(e, t)| (length(&e), e, t)).filter(|l| l.0 > target).collect();
         long.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut touched = vec![false; self.triangles.len()];
         let mut count = 0;
@@ -102,16 +106,11 @@ impl Patch {
 
     /// Flips inner edges whose opposite angles sum to more than 180°.
     fn flip_edges(&mut self, blocked: &dyn Fn(usize, usize) -> bool) -> usize {
-        let inner = self.inner_edges();
-        let mut edges: BTreeSet<(u32, u32)> = self
-            .triangles
-            .iter()
-            .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
-            .map(|(a, b)| (a.min(b), a.max(b)))
-            .collect();
+        let edges = Edges::new(&self.triangles);
+        let mut made: BTreeSet<(u32, u32)> = BTreeSet::new();
         let mut touched = vec![false; self.triangles.len()];
         let mut count = 0;
-        for ((a, b), [s, t]) in inner {
+        for ((a, b), [s, t]) in Self::inner_edges(&edges) {
             if touched[s] || touched[t] {
                 continue;
             }
@@ -120,14 +119,14 @@ impl Patch {
             };
             let new = (c.min(d), c.max(d));
             let both_border = (c as usize) < self.border && (d as usize) < self.border;
-            if c == d || edges.contains(&new) || (both_border && blocked(c as usize, d as usize)) {
+            let exists = edges.vertices.binary_search(&[new.0, new.1]).is_ok() || made.contains(&new);
+            if c == d || exists || (both_border && blocked(c as usize, d as usize)) {
                 continue;
             }
             if self.angle(c, a, b) + self.angle(d, a, b) <= std::f64::consts::PI + 1e-6 {
                 continue;
             }
-            edges.remove(&(a, b));
-            edges.insert(new);
+            made.insert(new);
             // (ca, cb) is the edge as triangle s runs along it: ca → cb → c.
             self.triangles[s] = [ca, d, c];
             self.triangles[t] = [d, cb, c];
@@ -150,9 +149,9 @@ impl Patch {
     }
 
     /// Moves inner vertices to the mean of their neighbours.
-    fn even_out(&mut self) {
-        let neighbors = crate::topology::VertexNeighbors::new(self.positions.len(), &self.triangles);
-        for _ in 0..3 {
+    fn even_out(&mut self, passes: usize) {
+        let neighbors = VertexNeighbors::new(self.positions.len(), &self.triangles);
+        for _ in 0..passes {
             for v in self.border..self.positions.len() {
                 let around = neighbors.of(v);
                 if !around.is_empty() {

@@ -24,11 +24,11 @@ struct Plate {
 
 /// Moves the inner vertices so that the area-weighted square of the cotangent Laplacian over patch and border is
 /// least, with the rings of mesh around the hole held: a thin plate that runs on without a crease.
-pub(super) fn relax(patch: &mut Patch, mesh: &Mesh, border: &[u32]) {
+pub(super) fn relax(patch: &mut Patch, mesh: &Mesh, around: &VertexTriangles, border: &[u32]) {
     if patch.positions.len() == patch.border {
         return;
     }
-    let plate = surroundings(patch, mesh, border);
+    let plate = surroundings(patch, mesh, around, border);
     let laplacian = |x: &[Vector3<f64>], out: &mut Vec<Vector3<f64>>| {
         out.clear();
         let row = |(v, row): (usize, &Vec<(u32, f64)>)| {
@@ -53,8 +53,7 @@ pub(super) fn relax(patch: &mut Patch, mesh: &Mesh, border: &[u32]) {
 }
 
 /// Positions, Laplacian rows and freedom of the patch followed by the rings around it.
-fn surroundings(patch: &Patch, mesh: &Mesh, border: &[u32]) -> Plate {
-    let around = VertexTriangles::new(mesh.positions.len(), &mesh.triangles);
+fn surroundings(patch: &Patch, mesh: &Mesh, around: &VertexTriangles, border: &[u32]) -> Plate {
     let mut number: BTreeMap<u32, u32> = border.iter().enumerate().map(|(k, &v)| (v, k as u32)).collect();
     let mut positions: Vec<Vector3<f64>> = patch.positions.iter().map(|p| p.coords).collect();
     let mut triangles = patch.triangles.clone();
@@ -154,15 +153,17 @@ fn least_squares(
 }
 
 /// For every inner vertex the weights (sum 1) of the border vertices: inverse square distances to the nearest ones.
-pub(super) fn border_weights(patch: &Patch, border: usize) -> Vec<Vec<f64>> {
+pub(super) fn border_weights(patch: &Patch, border: usize) -> Vec<Vec<(u32, f64)>> {
     let row = |p: &Point3<f64>| {
-        let distances: Vec<f64> = patch.positions[..border].iter().map(|q| (p - q).norm_squared()).collect();
-        let mut sorted = distances.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let limit = sorted[NEAREST.min(border) - 1];
-        let raw: Vec<f64> = distances.iter().map(|&d| if d <= limit { 1.0 / (d + 1e-9) } else { 0.0 }).collect();
-        let sum: f64 = raw.iter().sum();
-        raw.into_iter().map(|w| w / sum).collect()
+        let distances = patch.positions[..border].iter().map(|q| (p - q).norm_squared());
+        let mut nearest: Vec<(f64, u32)> = distances.zip(0..).collect();
+        if NEAREST < border {
+            nearest.select_nth_unstable_by(NEAREST, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            nearest.truncate(NEAREST);
+            nearest.sort_unstable_by_key(|n| n.1);
+        }
+        let sum: f64 = nearest.iter().map(|n| 1.0 / (n.0 + 1e-9)).sum();
+        nearest.into_iter().map(|(d, k)| (k, 1.0 / (d + 1e-9) / sum)).collect()
     };
     patch.positions[border..].iter().map(row).collect()
 }
