@@ -14,6 +14,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("toile-avatar", &["toile-geometry", "toile-character"]),
     ("toile-render", &["toile-geometry"]),
     ("toile-synthetic", &["toile-geometry", "toile-capture", "toile-character", "toile-render"]),
+    ("toile-stereo", &["toile-geometry", "toile-capture"]),
     ("toile-driver-synthetic", &["toile-geometry", "toile-capture", "toile-synthetic"]),
     ("toile-driver-transport", &[]),
     ("toile-driver-uvc-depth", &["toile-geometry", "toile-capture"]),
