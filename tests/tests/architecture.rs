@@ -15,6 +15,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("toile-render", &["toile-geometry"]),
     ("toile-synthetic", &["toile-geometry", "toile-capture", "toile-character", "toile-render"]),
     ("toile-stereo", &["toile-geometry", "toile-capture"]),
+    ("toile-driver-stereo", &["toile-geometry", "toile-capture", "toile-stereo"]),
     ("toile-driver-synthetic", &["toile-geometry", "toile-capture", "toile-synthetic"]),
     ("toile-driver-transport", &[]),
     ("toile-driver-uvc-depth", &["toile-geometry", "toile-capture"]),
