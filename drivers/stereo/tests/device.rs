@@ -222,7 +222,7 @@ impl Recorded {
             device_time_ns: (k / 2) as i64 * PERIOD,
             host_time_ns: 0,
             depth: None,
-            color: Some(ColorImage::Rgb(if k % 2 == 0 { left.clone() } else { right.clone() })),
+            color: Some(ColorImage::Rgb(if k.is_multiple_of(2) { left.clone() } else { right.clone() })),
         };
         Self { rig: toile_capture::Rig::default(), frames: (0..4).map(frame).collect() }
     }
