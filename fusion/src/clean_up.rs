@@ -48,11 +48,13 @@ pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, on_floor: bool) -> (Me
     raw.normals.clear();
     let closed = settings.fill_holes && settings.volume == Volume::Auto;
     let mut mesh = make_manifold(&raw);
+    drop(raw);
     let mut cleaned = Cleaned::default();
     if settings.volume == Volume::Auto {
         let (one, pieces) = keep_components(&mesh, subject_pieces);
-        let trimmed = make_manifold(&trim_border(&one, 3));
-        mesh = keep_components(&trimmed, subject_pieces).0;
+        mesh = trim_border(one, 3);
+        mesh = make_manifold(&mesh);
+        mesh = keep_components(&mesh, subject_pieces).0;
         cleaned.pieces_removed = pieces.saturating_sub(1);
     }
     if closed {

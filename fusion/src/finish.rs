@@ -26,6 +26,13 @@ const MOST_KEY_FRAMES: usize = 150;
 /// Frames in which a voxel must have been seen well, in weight units, to be surface.
 const LEAST_WEIGHT: u16 = 6;
 
+/// What the report tells about the final field.
+struct FieldSize {
+    blocks: usize,
+    bytes: usize,
+    truncation: f32,
+}
+
 impl Fuser {
     /// Closes the turn, fuses everything again and makes the scan.
     ///
@@ -47,12 +54,16 @@ impl Fuser {
                 progress(0.3 + 0.2 * (round + 1) as f32 / self.settings.refine_rounds as f32);
             }
         }
+        // At fine voxels memory decides: what is not needed any more goes before the next large thing comes.
+        self.model = self.empty_field(false);
         let field = self.fuse_again(true)?;
         progress(0.7);
         let raw = self.clock.time("extract", || extract_surface(&field, LEAST_WEIGHT));
         report.triangles_raw = raw.triangles.len();
         let placed = self.place(&raw, &mut report);
         let mesh = raw.transformed(&placed);
+        let size = FieldSize { blocks: field.block_count(), bytes: field.bytes(), truncation: field.truncation() };
+        drop((field, raw));
         let (settings, on_floor) = (&self.settings, self.volume.as_ref().is_some_and(|v| v.floor.is_some()));
         let (mesh, cleaned) = self.clock.time("clean up", || clean_up(mesh, settings, on_floor));
         report.triangles = mesh.triangles.len();
@@ -60,7 +71,7 @@ impl Fuser {
         report.filled_percent = cleaned.filled_percent;
         report.watertight = cleaned.watertight;
         progress(1.0);
-        Ok(self.scan(mesh, &field, &placed, report))
+        Ok(self.scan(mesh, &size, &placed, report))
     }
 
     fn views(&self, indices: &[usize]) -> Vec<View> {
@@ -156,7 +167,7 @@ impl Fuser {
         scan_frame(&axis, &poses[0], ground)
     }
 
-    fn scan(self, mesh: Mesh, field: &Tsdf, placed: &Rigid, mut report: FusionReport) -> Scan {
+    fn scan(self, mesh: Mesh, field: &FieldSize, placed: &Rigid, mut report: FusionReport) -> Scan {
         report.frames_seen = self.seen;
         report.frames_fused = self.kept.len();
         report.dropped = self.dropped;
@@ -167,17 +178,17 @@ impl Fuser {
             axis_distance_m: v.scan_from_camera.translation.vector.xz().norm(),
         });
         report.noise_mm = self.noise * 1e3;
-        report.truncation_mm = f64::from(field.truncation()) * 1e3;
+        report.truncation_mm = f64::from(field.truncation) * 1e3;
         let mut residuals: Vec<f64> = self.kept.iter().filter_map(|k| k.tracked.map(|t| t.residual * 1e3)).collect();
         residuals.sort_unstable_by(f64::total_cmp);
         report.residual_mm = residuals.get(residuals.len() / 2).copied().unwrap_or(0.0);
         report.residual_max_mm = residuals.last().copied().unwrap_or(0.0);
         report.warnings = warnings(&report);
         let mut timings = self.clock.timings();
-        timings.blocks = field.block_count();
-        timings.voxels = field.block_count() * crate::tsdf::VOXELS;
+        timings.blocks = field.blocks;
+        timings.voxels = field.blocks * crate::tsdf::VOXELS;
         timings.voxels_touched_per_frame = self.touched * crate::tsdf::VOXELS / self.kept.len().max(1);
-        timings.field_bytes = field.bytes();
+        timings.field_bytes = field.bytes;
         let trajectory = self
             .kept
             .into_iter()

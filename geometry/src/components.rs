@@ -138,8 +138,7 @@ fn fans(triangles: &[[u32; 3]], around: &[u32], v: u32) -> Vec<Vec<u32>> {
 }
 
 /// Cuts off triangles with two or three open sides, `passes` times, so that ragged borders become smoother.
-pub fn trim_border(mesh: &Mesh, passes: usize) -> Mesh {
-    let mut mesh = mesh.clone();
+pub fn trim_border(mut mesh: Mesh, passes: usize) -> Mesh {
     for _ in 0..passes {
         let edges = Edges::new(&mesh.triangles);
         let open = |t: usize| edges.of_triangle[t].iter().filter(|&&e| edges.uses[e as usize] == 1).count();
