@@ -1,6 +1,6 @@
 //! The poses that avatars rest in, found for any skeleton: A-pose and T-pose.
 
-use nalgebra::{Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::{
     Joint, Pose, Skeleton,
@@ -75,13 +75,18 @@ fn goal(joint: Joint, arm_down: f64, leg_out: f64) -> Goal {
     }
 }
 
-/// Least rotation from one direction to another; half a turn where they are opposite; none where one is zero.
+/// Least rotation from one direction to another; half a turn where they are opposite; none where one is zero. Safe
+/// where they are (nearly) the same: the cosine of rounded unit vectors may exceed 1.
 fn least_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
-    if from.norm() < 1e-9 || to.norm() < 1e-9 {
+    let (Some(a), Some(b)) = (from.try_normalize(1e-9), to.try_normalize(1e-9)) else {
         return UnitQuaternion::identity();
+    };
+    let (axis, cosine) = (a.cross(&b), a.dot(&b));
+    match axis.try_normalize(1e-12) {
+        Some(unit) => UnitQuaternion::from_scaled_axis(unit * axis.norm().atan2(cosine)),
+        None if cosine > 0.0 => UnitQuaternion::identity(),
+        None => UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::PI),
     }
-    let turn = Rotation3::rotation_between(from, to);
-    turn.map_or_else(|| UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::PI), |r| r.into())
 }
 
 /// How far the hips must rise for the ankles to keep their mean height.
@@ -107,6 +112,26 @@ mod tests {
         assert!(leg.x.abs() < 1e-6 && leg.z.abs() < 1e-6 && leg.y < -0.6, "{leg}");
         let rise = at(Joint::LeftFoot).y - skeleton.position(Joint::LeftFoot).y;
         assert!(rise.abs() < 0.005, "{rise}");
+    }
+
+    #[test]
+    fn limbs_that_are_straight_already_give_no_nan() {
+        let mean = BodyModel::load_default().unwrap().mean_skeleton;
+        // straightened again and again, at many angles: bones then have their goal's direction to the last digits
+        for k in 0..200 {
+            let (arm, leg) = (0.007 * f64::from(k), 0.002 * f64::from(k));
+            let mut skeleton = mean.clone();
+            for _ in 0..2 {
+                let pose = straight_limbs(&skeleton, arm, leg);
+                let at = pose.joint_positions(&skeleton);
+                assert!(at.iter().all(|p| p.coords.iter().all(|c| c.is_finite())), "{arm} {leg}");
+                skeleton.rest.copy_from_slice(&at);
+            }
+        }
+        let turn = |a: [f64; 3], b: [f64; 3]| least_turn(&Vector3::from(a), &Vector3::from(b)).angle();
+        assert_eq!(turn([1.0, 0.0, 0.0], [3.0, 0.0, 0.0]), 0.0);
+        assert!((turn([0.0, 2.0, 0.0], [0.0, -1.0, 0.0]) - std::f64::consts::PI).abs() < 1e-12);
+        assert_eq!(turn([0.0; 3], [0.0, -1.0, 0.0]), 0.0);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! - [`rig_scan`], [`rigged_scan`]: skin weights onto the scan itself;
 //! - [`pose_under`]: any skinned mesh posed inside a more dressed scan (eq. 5 and 6);
 //! - [`settle_under`]: the body in that pose, hands turned to the scan, drawn inside it;
-//! - [`measure()`]: stature and girths of a body at rest.
+//! - [`measure()`]: stature and girths of a body at rest; [`measure_table`]: all measures by ISO 8559-1.
 //!
 //! A fit that should not be trusted is a result with a [`Verdict`]; having no answer is a [`FittingError`].
 
@@ -22,11 +22,13 @@ pub mod measure;
 mod prepare;
 mod prior;
 mod rig;
+mod section;
 mod settings;
 mod settle;
 mod stance;
 mod start;
 mod summary;
+mod tape;
 mod thin;
 mod under;
 mod under_stage;
@@ -40,5 +42,6 @@ pub use rig::{rig_scan, rigged_scan};
 pub use settings::{ConformSettings, FitSettings, UnderSettings};
 pub use settle::{SettleReport, SettledBody, settle_under};
 pub use summary::{BodySummary, Theta};
+pub use tape::{BodyLandmark, BodyMeasure, MeasureKind, MeasureTable, measure_table};
 pub use under::{UnderFit, UnderReport, pose_under};
 pub use verdict::{DistanceStats, FitReport, Verdict};

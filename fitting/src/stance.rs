@@ -22,7 +22,7 @@ pub(crate) fn standing(body: &SkinnedMesh) -> Mesh {
 }
 
 /// The pose that brings the A-pose to the natural stance.
-fn stance(skeleton: &Skeleton) -> Pose {
+pub(crate) fn stance(skeleton: &Skeleton) -> Pose {
     let mut world = [UnitQuaternion::identity(); JOINT_COUNT];
     let mut pose = Pose::identity();
     for joint in JOINTS {

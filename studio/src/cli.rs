@@ -57,6 +57,8 @@ pub enum Command {
     Fuse(commands::fuse::Fuse),
     /// Fit the body to the scan of the undressed person
     Fit(commands::fit::Fit),
+    /// Measure the body as a tailor does (ISO 8559-1)
+    Measure(commands::measure::Measure),
     /// Cut the garments out of the dressed scans and stack them
     Extract(commands::extract::Extract),
     /// Write the avatar: GLB with a motion, VRM; or a take in a plain encoding

@@ -50,7 +50,11 @@ impl Fit {
     }
 }
 
-fn fit_scan(scan: &Path, out: &Path, session: &Session) -> Result<Answer, StudioError> {
+/// Fits a body to any scan and writes its files into `out`.
+///
+/// # Errors
+/// As [`Fit::run`].
+pub fn fit_scan(scan: &Path, out: &Path, session: &Session) -> Result<Answer, StudioError> {
     must_exist(scan)?;
     let name = scan.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let run = Run::single(scan.parent().unwrap_or(Path::new(".")), &name, &session.progress);
@@ -62,7 +66,7 @@ fn fit_scan(scan: &Path, out: &Path, session: &Session) -> Result<Answer, Studio
         keep_frame: false,
     };
     let record = fit::fit(&run, &place, &BodyModel::load_default()?)?;
-    let files = ["body.ply", "model.ply", "rest.ply", "rigged_scan.glb", "body.json", "pose.json"].map(|f| out.join(f));
+    let files: Vec<PathBuf> = fit::FILES.iter().chain(&["pose.json"]).map(|f| out.join(f)).collect();
     Ok(Answer {
         text: files.iter().map(|f| format!("{}\n", f.display())).collect(),
         results: json!({ "files": files, "fit": record.result }),

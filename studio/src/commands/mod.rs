@@ -9,6 +9,7 @@ pub mod fit;
 pub mod fuse;
 pub mod import;
 pub mod inspect;
+pub mod measure;
 pub mod process;
 pub mod synthesize;
 

@@ -1,13 +1,13 @@
 //! Stage `fit`: the undressed scan → the body: shape, pose, own surface, weights, measures.
 //!
 //! Reads `00-body/scan.ply`. Writes `00-body/pose.json` and in `body/`: `body.ply`, `model.ply`, `rest.ply`,
-//! `rigged_scan.glb`, `body.json`.
+//! `rigged_scan.glb`, `body.json`, `measurements.json`, `measurements.csv`, `standing.ply`.
 
 use std::path::PathBuf;
 
 use nalgebra::Translation3;
 use toile_character::BodyModel;
-use toile_fitting::{BodyFit, FitReport, FitSettings, Mend, Verdict, fit_body, rig_scan};
+use toile_fitting::{BodyFit, FitReport, FitSettings, Mend, Verdict, fit_body, measure_table, rig_scan};
 use toile_geometry::{Mesh, Rigid, color_transfer::closest_colors, ply};
 
 use crate::{
@@ -17,9 +17,21 @@ use crate::{
 };
 
 /// Raised whenever the same scan and settings give another body.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
+
+/// What a fit writes into the body's folder.
+pub const FILES: [&str; 8] = [
+    "body.ply",
+    "model.ply",
+    "rest.ply",
+    "rigged_scan.glb",
+    "body.json",
+    "measurements.json",
+    "measurements.csv",
+    "standing.ply",
+];
 
 /// Where the files of a fit go.
 pub struct Place {
@@ -52,7 +64,6 @@ pub fn run(run: &Run, model: &BodyModel) -> Result<Record, StudioError> {
 pub fn fit(run: &Run, place: &Place, model: &BodyModel) -> Result<Record, StudioError> {
     let settings = FitSettings::default();
     let at = |name: &str| place.folder.join(name);
-    let names = ["body.ply", "model.ply", "rest.ply", "rigged_scan.glb", "body.json"];
     let stage = Stage {
         name: "fit",
         version: VERSION,
@@ -61,7 +72,7 @@ pub fn fit(run: &Run, place: &Place, model: &BodyModel) -> Result<Record, Studio
         folder: place.folder.clone(),
         inputs: vec![place.scan.clone()],
         settings: plain(&settings)?,
-        outputs: names.iter().map(|n| at(n)).chain([place.pose.clone()]).collect(),
+        outputs: FILES.iter().map(|n| at(n)).chain([place.pose.clone()]).collect(),
         outputs_vary: false,
     };
     stage.run(&run.label("body", "fit"), run.progress, |progress| {
@@ -70,7 +81,7 @@ pub fn fit(run: &Run, place: &Place, model: &BodyModel) -> Result<Record, Studio
         if place.keep_frame {
             back_to_the_scan(&mut fit, place)?;
         }
-        product(place, &scan, &fit)
+        product(place, model, &scan, &fit)
     })
 }
 
@@ -87,7 +98,7 @@ fn back_to_the_scan(fit: &mut BodyFit, place: &Place) -> Result<(), StudioError>
     Ok(())
 }
 
-fn product(place: &Place, scan: &Mesh, fit: &BodyFit) -> Result<Product, StudioError> {
+fn product(place: &Place, model: &BodyModel, scan: &Mesh, fit: &BodyFit) -> Result<Product, StudioError> {
     let at = |name: &str| place.folder.join(name);
     let report = &fit.report;
     if fit.verdict() == Verdict::Failed {
@@ -99,7 +110,11 @@ fn product(place: &Place, scan: &Mesh, fit: &BodyFit) -> Result<Product, StudioE
     let rigged = deliverables::rigged_scan(&scan, &weights, &fit.skeleton, &fit.pose)?;
     let mut body = fit.posed_body();
     body.colors = closest_colors(&scan, &body.positions, &body.normals);
+    let table = measure_table(model, &fit.body, &fit.measurements).map_err(|e| StudioError::stage(&place.scan, e))?;
     let files = vec![
+        (at("measurements.json"), stage::pretty(&table)?),
+        (at("measurements.csv"), table.csv().into_bytes()),
+        (at("standing.ply"), ply::encode(&table.standing)),
         (at("body.ply"), ply::encode(&body)),
         (at("model.ply"), ply::encode(&fit.model_mesh)),
         (at("rest.ply"), ply::encode(&fit.body.mesh)),

@@ -75,6 +75,16 @@ impl Folders {
         self.body().join("body.json")
     }
 
+    /// Measurements by ISO 8559-1.
+    pub fn measurements(&self) -> PathBuf {
+        self.body().join("measurements.json")
+    }
+
+    /// The body standing straight, as it was measured.
+    pub fn standing(&self) -> PathBuf {
+        self.body().join("standing.ply")
+    }
+
     /// Where the stages over all layers keep their records.
     pub fn layers(&self) -> PathBuf {
         self.build().join("layers")

@@ -6,6 +6,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use serde_json::{Value, json};
 use toile_character::{Motion, SkinWeights, skinning};
+use toile_fitting::{BodyMeasure, MeasureTable};
 use toile_geometry::Mesh;
 
 use crate::{
@@ -21,7 +22,7 @@ use crate::{
 };
 
 /// Raised whenever the page looks different.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
 /// Times of the motion that are shown.
@@ -34,7 +35,7 @@ const FRAMES: usize = 4;
 pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Result<(), StudioError> {
     let folders = &run.folders;
     let garments: Vec<&str> = run.garments().collect();
-    let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.glb()];
+    let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.measurements(), folders.glb()];
     inputs.extend(run.layers.iter().map(|l| folders.scan(l)));
     inputs.extend(garments.iter().flat_map(|l| [folders.garment(l), folders.unstacked(l)]));
     let said = json!([summary.warnings, summary.lost, summary.failures, run.layers, run.title()]);
@@ -73,11 +74,14 @@ fn contents(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Re
     let garments = read_all(&worn, &|l| folders.garment(l))?;
     let body_mesh = run.read_mesh(&folders.body_mesh())?;
     let moved = motion::load(bvh, &body.skinned.skeleton)?.motion;
+    let table: MeasureTable = read_json(&folders.measurements())?;
     Ok(Contents {
         name: run.title().to_string(),
         subtitle: run.subtitle(),
         takes: takes.iter().map(|l| take_row(l, summary)).collect(),
-        measurements: measurement_rows(run),
+        measurements: measurement_rows(&table),
+        tapes: table.measures.into_iter().map(|m| m.path).collect(),
+        standing: run.read_mesh(&folders.standing())?,
         warnings: summary.warnings.clone(),
         lost: summary.lost.clone(),
         failures: summary.failures.clone(),
@@ -115,14 +119,10 @@ fn take_row(layer: &str, summary: &Summary) -> TakeRow {
     }
 }
 
-fn measurement_rows(run: &Run) -> Vec<(String, String)> {
-    let values = measurements(run).unwrap_or_default();
-    let length = |value: &Value| value.as_f64().map_or("–".to_string(), |m| format!("{:.1} cm", 100.0 * m));
-    let mut rows = vec![("stature".to_string(), length(&values["stature_m"]))];
-    let girths = values["girths_m"].as_object().into_iter().flatten();
-    rows.extend(girths.map(|(name, value)| (format!("{name} girth"), length(value))));
-    let litres = values["volume_m3"].as_f64().map_or("–".to_string(), |v| format!("{:.1} l", 1e3 * v));
-    rows.push(("volume".into(), litres));
+fn measurement_rows(table: &MeasureTable) -> Vec<(String, String)> {
+    let row = |m: &BodyMeasure| (m.name.clone(), format!("{:.1} cm", 100.0 * m.value_m));
+    let mut rows: Vec<_> = table.measures.iter().map(row).collect();
+    rows.push(("volume".into(), format!("{:.1} l", table.volume_l)));
     rows
 }
 

@@ -23,6 +23,10 @@ pub struct Contents {
     pub takes: Vec<TakeRow>,
     /// Measurements: what, and its value with unit.
     pub measurements: Vec<(String, String)>,
+    /// Where the tapes lay on the standing body: corners in metres.
+    pub tapes: Vec<Vec<[f64; 3]>>,
+    /// The body standing straight.
+    pub standing: Mesh,
     /// What to worry about.
     pub warnings: Vec<String>,
     /// Recorded data that was lost.
@@ -73,6 +77,8 @@ pub fn write(contents: &Contents, at: &Path, progress: &(dyn Fn(f32) + Sync)) ->
     if let Some((_, scan)) = contents.scans.first() {
         page.pictures(&drawn(pictures::body_over_scan(scan, &contents.body))?)?;
     }
+    page.section("Measurements", "ISO 8559-1, standing straight; the red lines show where each was taken.");
+    page.pictures(&drawn(pictures::measured(&contents.standing, &contents.tapes))?)?;
     let rows: Vec<Vec<String>> = contents.measurements.iter().map(|(k, v)| vec![k.clone(), v.clone()]).collect();
     page.table(&["measurement", "value"], &rows);
     progress(0.8);

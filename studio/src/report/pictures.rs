@@ -1,8 +1,11 @@
 //! The pictures of a report.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::{
+    f32::consts::TAU,
+    f64::consts::{FRAC_PI_2, PI},
+};
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use toile_geometry::{Mesh, bvh::Bvh};
 use toile_render::{Drawn, RenderError, View, picture, sheet};
@@ -15,6 +18,9 @@ const SIZE: (u32, u32) = (300, 440);
 const DISTANCE_RANGE_MM: f32 = 15.0;
 /// Name of the attribute that holds them.
 const DISTANCE: &str = "distance_mm";
+/// Colour and radius (metres) of the tapes on the body.
+const TAPE: [u8; 3] = [200, 30, 40];
+const CORD_RADIUS: f32 = 0.004;
 /// Colour of the body under a garment.
 const SKIN: [u8; 3] = [205, 190, 178];
 
@@ -50,6 +56,39 @@ pub fn body_over_scan(scan: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderEr
     pictures.push(one(&[Drawn::clay(body)], &View::front(), "body, front")?);
     pictures.push(one(&[Drawn::clay(body)], &View::around(FRAC_PI_2, 0.0), "body, left side")?);
     Ok(pictures)
+}
+
+/// The standing body with the tapes that measured it from front, side and back.
+///
+/// # Errors
+/// [`RenderError`] where the mesh cannot be drawn.
+pub fn measured(standing: &Mesh, tapes: &[Vec<[f64; 3]>]) -> Result<Vec<Picture>, RenderError> {
+    let cords = cords(tapes);
+    turn(&[Drawn::clay(standing), Drawn::solid(&cords, TAPE, 1.0)], &["front", "left side", "back"])
+}
+
+/// Three-sided cords along polylines.
+fn cords(lines: &[Vec<[f64; 3]>]) -> Mesh {
+    let mut mesh = Mesh::default();
+    for ends in lines.iter().flat_map(|l| l.windows(2)) {
+        let [a, b] = [0, 1].map(|k| Point3::from(ends[k]).cast::<f32>());
+        let Some(along) = (b - a).try_normalize(1e-6) else { continue };
+        let seed = if along.y.abs() < 0.9 { Vector3::y() } else { Vector3::x() };
+        let u = along.cross(&seed).normalize();
+        let v = along.cross(&u);
+        let first = mesh.positions.len() as u32;
+        for k in 0..3 {
+            let angle = TAU * k as f32 / 3.0;
+            let out = (u * angle.cos() + v * angle.sin()) * CORD_RADIUS;
+            mesh.positions.extend([a + out, b + out]);
+        }
+        for k in 0..3u32 {
+            let (p, q) = (first + 2 * k, first + 2 * ((k + 1) % 3));
+            mesh.triangles.extend([[p, q, p + 1], [q, q + 1, p + 1]]);
+        }
+    }
+    mesh.recompute_normals();
+    mesh
 }
 
 /// A garment alone (front and back) and on what is worn below it.

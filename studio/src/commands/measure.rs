@@ -1,0 +1,68 @@
+//! `toile measure`: the measurements of a subject, or of any scan or body.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+use toile_fitting::MeasureTable;
+
+use crate::{
+    StudioError,
+    commands::{fit::fit_scan, must_exist, reach},
+    outcome::Answer,
+    pipeline::{Goal, Options, body_file::read_json, folders::Folders},
+    run::Session,
+};
+
+const AFTER: &str = "\
+Girths as a taut tape lies, heights above the soles, standing straight. Fits the body first where that is missing.
+
+Examples:
+  toile measure anna
+  toile measure --scan somebody.ply --out somebody      writes somebody/measurements.json and .csv";
+
+/// Measure the body as a tailor does (ISO 8559-1)
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Measure {
+    /// The subject
+    #[arg(required_unless_present = "scan", conflicts_with = "scan")]
+    subject: Option<PathBuf>,
+    /// Instead of a subject: any mesh of a standing person, scan or body (PLY or OBJ), metres, +Y up
+    #[arg(long, value_name = "MESH", requires = "out")]
+    scan: Option<PathBuf>,
+    /// Folder of the result, with --scan
+    #[arg(long, value_name = "DIR", requires = "scan")]
+    out: Option<PathBuf>,
+}
+
+impl Measure {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where there is no person to measure, or files cannot be read or written.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        match (&self.subject, &self.scan, &self.out) {
+            (Some(subject), ..) => {
+                must_exist(subject)?;
+                let fitted = reach(subject, Goal::Body, &Options::default(), session)?;
+                measured(fitted, &Folders::new(subject).body())
+            }
+            (None, Some(scan), Some(out)) => measured(fit_scan(scan, out, session)?, out),
+            _ => Err(StudioError::Usage("give a subject, or --scan MESH with --out DIR".into())),
+        }
+    }
+}
+
+/// What a fit said, with the table that it wrote into `folder`.
+fn measured(fitted: Answer, folder: &Path) -> Result<Answer, StudioError> {
+    let table: MeasureTable = read_json(&folder.join("measurements.json"))?;
+    let width = table.measures.iter().map(|m| m.name.len()).max().unwrap_or(0);
+    let mut text: String =
+        table.measures.iter().map(|m| format!("{:width$}  {:6.1} cm\n", m.name, 100.0 * m.value_m)).collect();
+    text += &format!("{:width$}  {:6.1} l\n", "volume", table.volume_l);
+    let files = ["measurements.json", "measurements.csv"].map(|f| folder.join(f));
+    text.extend(files.iter().map(|f| format!("{}\n", f.display())));
+    let values: serde_json::Map<_, _> = table.measures.iter().map(|m| (m.name.clone(), json!(m.value_m))).collect();
+    let results = json!({ "measurements_m": values, "volume_l": table.volume_l, "files": files });
+    Ok(Answer { text, results, ..fitted })
+}
