@@ -13,7 +13,7 @@ fn basic(model: &BodyModel, body: &SkinnedMesh) -> Measurements {
 }
 
 fn table(model: &BodyModel, body: &SkinnedMesh) -> MeasureTable {
-    measure_table(model, body, &basic(model, body)).unwrap()
+    measure_table(model, body, &basic(model, body)).expect("a body of the model")
 }
 
 #[test]
