@@ -1,0 +1,49 @@
+//! Scans that show no person, or not as one should stand: the verdict says so and what to do.
+
+mod common;
+
+use common::{Numbers, cuboid, finer, joined};
+use nalgebra::{Point3, Vector3};
+use toile_character::BodyModel;
+use toile_fitting::{FitSettings, Verdict, fit_body};
+use toile_geometry::Mesh;
+
+/// An ellipsoid, outward, with some noise.
+fn ellipsoid(center: [f32; 3], radii: [f32; 3], seed: u64) -> Mesh {
+    let mut numbers = Numbers(seed);
+    let mut mesh = finer(&cuboid([-1.0; 3], [1.0; 3]), 5);
+    for p in &mut mesh.positions {
+        let n = p.coords.normalize();
+        let r = 1.0 + 0.01 * numbers.next() as f32;
+        *p = Point3::from(Vector3::from(center) + n.component_mul(&Vector3::from(radii)) * r);
+    }
+    mesh
+}
+
+#[test]
+fn a_cat_is_no_person() {
+    let model = BodyModel::load_default().unwrap();
+    let leg = |x: f32, z: f32| ellipsoid([x, 0.08, z], [0.025, 0.09, 0.025], 3);
+    let cat = joined(&[
+        ellipsoid([0.0, 0.2, 0.0], [0.2, 0.08, 0.08], 1),
+        ellipsoid([0.24, 0.28, 0.0], [0.06, 0.06, 0.05], 2),
+        leg(0.14, 0.04),
+        leg(0.14, -0.04),
+        leg(-0.14, 0.04),
+        leg(-0.14, -0.04),
+        ellipsoid([-0.27, 0.3, 0.0], [0.02, 0.12, 0.02], 4),
+    ]);
+    let fit = fit_body(&model, &cat, &FitSettings::default(), &|_| {}).unwrap();
+    assert_eq!(fit.verdict(), Verdict::Failed, "{:?}", fit.report);
+    assert!(fit.report.reasons.iter().any(|r| r.contains("tall") || r.contains("person")), "{:?}", fit.report.reasons);
+}
+
+#[test]
+fn a_wall_and_a_ball_are_no_person() {
+    let model = BodyModel::load_default().unwrap();
+    for scan in [finer(&cuboid([0.0; 3], [1.5, 1.8, 0.02]), 5), ellipsoid([0.0, 0.9, 0.0], [0.9; 3], 5)] {
+        let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {}).unwrap();
+        assert_eq!(fit.verdict(), Verdict::Failed, "{:?}", fit.report);
+        assert!(!fit.report.reasons.is_empty());
+    }
+}
