@@ -22,7 +22,7 @@ use toile_geometry::{
     mesh::{triangle_normals, vertex_normals},
 };
 
-use crate::{ConformSettings, FitSettings, FittingError, articulated::State};
+use crate::{ConformSettings, FitSettings, FittingError, articulated::State, uncross::uncrossed};
 
 /// Draws an unseen vertex back to the statistical model.
 const TIE: f64 = 2e-5;
@@ -68,7 +68,8 @@ pub(crate) fn conform(
         points = elastic.solve(&start, &pulls)?;
         release_folds(model, &start, &points, &mut freedom);
     }
-    Ok(Conformed { points: unfolded(model, &start, points) })
+    let points = unfolded(model, &start, points);
+    Ok(Conformed { points: uncrossed(&model.triangles, &start, points) })
 }
 
 /// How far each vertex follows the scan, 0 to 1: fingers and face are thin or finely shaped, scans of them poor.

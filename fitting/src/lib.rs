@@ -30,6 +30,7 @@ mod start;
 mod summary;
 mod tape;
 mod thin;
+mod uncross;
 mod under;
 mod under_stage;
 mod verdict;
