@@ -1,25 +1,31 @@
-//! USB: what is plugged in, at which speed, and the permission to use it.
+//! USB: the bus, devices with asynchronous transfers, and an in-process twin that device models plug into.
 //!
-//! - [`usb::list`]: the depth cameras on the bus (through rusb), with what is wrong with each;
-//! - [`known`]: the devices that Toile knows by vendor and product id;
+//! - [`Bus`] lists and opens devices; [`UsbDevice`] is an open one: control and bulk requests with a time limit, and
+//!   transfers in flight ([`Transfer`]: owned by whoever may touch it, by nobody while the kernel fills it);
+//! - [`libusb`]: both over libusb (through rusb), with an event thread of its own; the only place with `unsafe`;
+//! - [`twin`]: both in this process, over a [`twin::DeviceModel`], in bus time instead of the clock's;
+//! - [`usb::list`]: the depth cameras on the bus, with what is wrong with each; [`known`]: which those are;
 //! - [`udev`]: the rule that gives a user access to them.
+//!
+//! ```
+//! use std::time::Duration;
+//! use toile_driver_transport::{Bus, TransportError, twin::VirtualBus};
+//! let bus = VirtualBus::default();
+//! assert!(bus.list()?.is_empty());
+//! let missing = toile_driver_transport::open_known(&bus, |info| info.vendor == 0x045e, "a Kinect");
+//! assert!(matches!(missing.err(), Some(TransportError::NotFound { .. })));
+//! # Ok::<(), TransportError>(())
+//! ```
 
+pub mod bus;
+pub mod error;
 pub mod known;
+pub mod libusb;
+pub mod transfer;
+pub mod twin;
 pub mod udev;
 pub mod usb;
 
-/// Errors of the transport crate.
-#[derive(Debug, thiserror::Error)]
-pub enum TransportError {
-    /// libusb cannot start or list.
-    #[error("USB cannot be read: {0}; is /dev/bus/usb there and readable?")]
-    Usb(#[from] rusb::Error),
-    /// The udev rule could not be written.
-    #[error("{path}: {source}; run the command as root (sudo)")]
-    Rule {
-        /// Where the rule should go.
-        path: std::path::PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-}
+pub use bus::{Bus, DeviceInfo, LinkSpeed, Setup, UsbDevice, open_known, wait_for};
+pub use error::TransportError;
+pub use transfer::{PacketStatus, Transfer, TransferKind, TransferStatus};

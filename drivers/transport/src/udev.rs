@@ -13,13 +13,24 @@ pub const RULES_FOLDER: &str = "/etc/udev/rules.d";
 /// Text of the rule for every known vendor: USB nodes and their video nodes.
 pub fn rules() -> String {
     let mut text = String::from("# Depth cameras that Toile uses; gives the user at the seat access.\n");
-    for vendor in known::vendors() {
-        text.push_str(&format!(
-            "SUBSYSTEM==\"usb\", ATTRS{{idVendor}}==\"{vendor:04x}\", MODE=\"0660\", TAG+=\"uaccess\"\n\
-             SUBSYSTEM==\"video4linux\", ATTRS{{idVendor}}==\"{vendor:04x}\", MODE=\"0660\", TAG+=\"uaccess\"\n"
-        ));
-    }
+    known::vendors().into_iter().for_each(|vendor| text.push_str(&rule(vendor)));
     text
+}
+
+/// What to do where a vendor's camera may not be opened: the exact rule, and how to install it.
+pub fn advice(vendor: u16) -> String {
+    format!(
+        "Run `sudo toile devices --install-udev-rules`, which writes {RULES_FOLDER}/{RULE_FILE}, then plug it in again. \
+         The rule:\n{}",
+        rule(vendor).trim_end()
+    )
+}
+
+fn rule(vendor: u16) -> String {
+    format!(
+        "SUBSYSTEM==\"usb\", ATTRS{{idVendor}}==\"{vendor:04x}\", MODE=\"0660\", TAG+=\"uaccess\"\n\
+         SUBSYSTEM==\"video4linux\", ATTRS{{idVendor}}==\"{vendor:04x}\", MODE=\"0660\", TAG+=\"uaccess\"\n"
+    )
 }
 
 /// Writes the rule into `folder` and returns the file.

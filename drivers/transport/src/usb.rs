@@ -3,21 +3,7 @@
 use rusb::UsbContext;
 use serde::Serialize;
 
-use crate::{TransportError, known, known::Known, udev};
-
-/// How fast a device is linked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LinkSpeed {
-    /// Not told by the system.
-    Unknown,
-    /// USB 1: 12 Mbit/s or less.
-    Full,
-    /// USB 2: 480 Mbit/s.
-    High,
-    /// USB 3: 5 Gbit/s or more.
-    Super,
-}
+use crate::{LinkSpeed, TransportError, known, known::Known, libusb::info_of, udev};
 
 /// A known camera that is plugged in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -45,30 +31,20 @@ pub fn list() -> Result<Vec<UsbCamera>, TransportError> {
     let context = rusb::Context::new()?;
     let mut cameras = Vec::new();
     for device in context.devices()?.iter() {
-        let Ok(descriptor) = device.device_descriptor() else { continue };
-        let Some(known) = known::find(descriptor.vendor_id(), descriptor.product_id()) else { continue };
-        let speed = link_speed(device.speed());
+        let Some(info) = info_of(&device) else { continue };
+        let Some(known) = known::find(info.vendor, info.product) else { continue };
         let opened = device.open().map(|_| ());
         cameras.push(UsbCamera {
             name: known.name,
             family: known.family,
             id: (known.vendor, known.product),
-            address: (device.bus_number(), device.address()),
-            speed,
-            problems: problems(&known, speed, opened),
+            address: info.address,
+            speed: info.speed,
+            problems: problems(&known, info.speed, opened),
         });
     }
     cameras.sort_by_key(|c| c.address);
     Ok(cameras)
-}
-
-fn link_speed(speed: rusb::Speed) -> LinkSpeed {
-    match speed {
-        rusb::Speed::Low | rusb::Speed::Full => LinkSpeed::Full,
-        rusb::Speed::High => LinkSpeed::High,
-        rusb::Speed::Super | rusb::Speed::SuperPlus => LinkSpeed::Super,
-        _ => LinkSpeed::Unknown,
-    }
 }
 
 fn problems(known: &Known, speed: LinkSpeed, opened: Result<(), rusb::Error>) -> Vec<String> {
@@ -79,11 +55,7 @@ fn problems(known: &Known, speed: LinkSpeed, opened: Result<(), rusb::Error>) ->
         found.push("it is on a USB 2 link, which halves its frame rate: use a blue port and a USB 3 cable".to_string());
     }
     match opened {
-        Err(rusb::Error::Access) => found.push(format!(
-            "no permission to open it: run `sudo toile devices --install-udev-rules` (writes {}/{}), then plug it in again",
-            udev::RULES_FOLDER,
-            udev::RULE_FILE
-        )),
+        Err(rusb::Error::Access) => found.push(format!("no permission to open it. {}", udev::advice(known.vendor))),
         Err(rusb::Error::Busy) => found.push("another program holds it: close that program".to_string()),
         Err(rusb::Error::NoDevice) => found.push("it was unplugged just now: plug it in again".to_string()),
         Err(other) => found.push(format!("it cannot be opened: {other}")),
@@ -102,7 +74,7 @@ mod tests {
         let both = problems(&kinect2, LinkSpeed::High, Err(rusb::Error::Access));
         assert_eq!(both.len(), 2);
         assert!(both[0].contains("USB 3"));
-        assert!(both[1].contains("--install-udev-rules"));
+        assert!(both[1].contains("--install-udev-rules") && both[1].contains("ATTRS{idVendor}==\"045e\""));
         assert!(problems(&kinect2, LinkSpeed::Super, Ok(())).is_empty());
         let kinect1 = known::find(0x045e, 0x02ae).unwrap();
         assert!(problems(&kinect1, LinkSpeed::High, Ok(())).is_empty());

@@ -1,0 +1,77 @@
+//! What can go wrong between a program and a USB device.
+
+use std::time::Duration;
+
+use crate::{DeviceInfo, udev};
+
+/// Errors of the transport crate.
+#[derive(Debug, thiserror::Error)]
+pub enum TransportError {
+    /// libusb cannot start or list.
+    #[error("USB cannot be read: {0}; is /dev/bus/usb there and readable?")]
+    Usb(#[from] rusb::Error),
+    /// The udev rule could not be written.
+    #[error("{path}: {source}; run the command as root (sudo)")]
+    Rule {
+        /// Where the rule should go.
+        path: std::path::PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Nothing of the kind is plugged in.
+    #[error("{what} is not plugged in; check the cable and its power supply, and see `toile devices`")]
+    NotFound {
+        /// What was looked for.
+        what: String,
+    },
+    /// The device went away.
+    #[error("the device was unplugged; plug it in and open it again")]
+    Unplugged,
+    /// This user may not open the device.
+    #[error("{device}: no permission to open it. {}", udev::advice(.device.vendor))]
+    NoPermission {
+        /// Which device.
+        device: DeviceInfo,
+    },
+    /// Another program or a kernel driver holds the device.
+    #[error("{device}: another program holds it; close that program")]
+    Busy {
+        /// Which device.
+        device: DeviceInfo,
+    },
+    /// An answer did not come in time.
+    #[error("{what}: no answer in {} ms", .waited.as_millis())]
+    TimedOut {
+        /// What was asked.
+        what: String,
+        /// For how long.
+        waited: Duration,
+    },
+    /// The device refused a request.
+    #[error("{what}: the device refused it (stall)")]
+    Stalled {
+        /// What was asked.
+        what: String,
+    },
+    /// Anything else that libusb reports.
+    #[error("{what}: {source}")]
+    Failed {
+        /// What was asked.
+        what: String,
+        /// What libusb said.
+        source: rusb::Error,
+    },
+}
+
+impl TransportError {
+    /// Sorts an error of libusb into what a caller can act on.
+    pub fn from_libusb(error: rusb::Error, what: &str, waited: Duration) -> Self {
+        let what = what.to_string();
+        match error {
+            rusb::Error::NoDevice => Self::Unplugged,
+            rusb::Error::Timeout => Self::TimedOut { what, waited },
+            rusb::Error::Pipe => Self::Stalled { what },
+            source => Self::Failed { what, source },
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! An open device through libusb.
+
+use std::{
+    sync::{
+        Arc,
+        mpsc::{self, Receiver, RecvTimeoutError, Sender},
+    },
+    time::{Duration, Instant},
+};
+
+use rusb::{Context, DeviceHandle};
+
+use super::{
+    event_loop::EventLoop,
+    transfer::{Flights, submit},
+};
+use crate::{DeviceInfo, Setup, Transfer, TransferKind, TransferStatus, TransportError, UsbDevice};
+
+/// What transfers in flight keep alive: the handle first, then the thread that finishes them.
+pub(super) struct Shared {
+    pub(super) handle: DeviceHandle<Context>,
+    pub(super) flights: Flights,
+    _events: Arc<EventLoop>,
+}
+
+/// How long dropping a device waits for its transfers.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// An open device; see [`UsbDevice`].
+pub struct LibusbDevice {
+    shared: Arc<Shared>,
+    info: DeviceInfo,
+    serial: String,
+    done: Receiver<Transfer>,
+    to_done: Sender<Transfer>,
+    gone: bool,
+}
+
+impl LibusbDevice {
+    pub(super) fn new(handle: DeviceHandle<Context>, info: DeviceInfo, events: Arc<EventLoop>) -> Self {
+        let descriptor = handle.device().device_descriptor();
+        let serial = descriptor.and_then(|d| handle.read_serial_number_string_ascii(&d)).unwrap_or_default();
+        let (to_done, done) = mpsc::channel();
+        let shared = Arc::new(Shared { handle, flights: Flights::default(), _events: events });
+        Self { shared, info, serial, done, to_done, gone: false }
+    }
+
+    fn failed<T>(&mut self, error: rusb::Error, what: &str, limit: Duration) -> Result<T, TransportError> {
+        self.gone |= error == rusb::Error::NoDevice;
+        Err(TransportError::from_libusb(error, what, limit))
+    }
+}
+
+impl UsbDevice for LibusbDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn serial(&self) -> &str {
+        &self.serial
+    }
+
+    fn claim(&mut self, interface: u8, alternate: u8) -> Result<(), TransportError> {
+        let handle = &self.shared.handle;
+        // Where the system cannot detach kernel drivers, claiming says what is wrong.
+        let _ = handle.set_auto_detach_kernel_driver(true);
+        let claimed = handle.claim_interface(interface).and_then(|()| match alternate {
+            0 => Ok(()),
+            _ => handle.set_alternate_setting(interface, alternate),
+        });
+        match claimed {
+            Ok(()) => Ok(()),
+            Err(rusb::Error::Busy) => Err(TransportError::Busy { device: self.info.clone() }),
+            Err(error) => self.failed(error, "claiming the interface", Duration::ZERO),
+        }
+    }
+
+    fn control_in(&mut self, setup: Setup, data: &mut [u8], limit: Duration) -> Result<usize, TransportError> {
+        let Setup { request_type, request, value, index, .. } = setup;
+        let came = self.shared.handle.read_control(request_type, request, value, index, data, limit);
+        came.or_else(|error| self.failed(error, &format!("control request {request:#04x}"), limit))
+    }
+
+    fn control_out(&mut self, setup: Setup, data: &[u8], limit: Duration) -> Result<usize, TransportError> {
+        let Setup { request_type, request, value, index, .. } = setup;
+        let went = self.shared.handle.write_control(request_type, request, value, index, data, limit);
+        went.or_else(|error| self.failed(error, &format!("control request {request:#04x}"), limit))
+    }
+
+    fn bulk_in(&mut self, endpoint: u8, data: &mut [u8], limit: Duration) -> Result<usize, TransportError> {
+        let came = self.shared.handle.read_bulk(endpoint, data, limit);
+        came.or_else(|error| self.failed(error, &format!("reading endpoint {endpoint:#04x}"), limit))
+    }
+
+    fn bulk_out(&mut self, endpoint: u8, data: &[u8], limit: Duration) -> Result<usize, TransportError> {
+        let went = self.shared.handle.write_bulk(endpoint, data, limit);
+        went.or_else(|error| self.failed(error, &format!("writing endpoint {endpoint:#04x}"), limit))
+    }
+
+    fn iso_packet_size(&self, endpoint: u8) -> Option<usize> {
+        let config = self.shared.handle.device().active_config_descriptor().ok()?;
+        let endpoints = config.interfaces().flat_map(|i| i.descriptors().collect::<Vec<_>>());
+        let sizes = endpoints.flat_map(|d| {
+            let of_it = d.endpoint_descriptors().filter(|e| e.address() == endpoint);
+            // Bits 12:11 say how many more transactions a microframe has (USB 2.0 table 9-13).
+            of_it
+                .map(|e| usize::from(e.max_packet_size() & 0x7ff) * (1 + usize::from(e.max_packet_size() >> 11 & 3)))
+                .collect::<Vec<_>>()
+        });
+        sizes.max().filter(|&size| size > 0)
+    }
+
+    fn submit(&mut self, mut transfer: Transfer) -> Result<(), TransportError> {
+        if self.gone {
+            return Err(TransportError::Unplugged);
+        }
+        transfer.clear();
+        let what = match transfer.kind {
+            TransferKind::Bulk => "starting a bulk transfer",
+            TransferKind::Isochronous => "starting an isochronous transfer",
+        };
+        submit(&self.shared, transfer, self.to_done.clone()).or_else(|error| self.failed(error, what, Duration::ZERO))
+    }
+
+    fn wait(&mut self, limit: Duration) -> Result<Transfer, TransportError> {
+        if self.gone && self.in_flight() == 0 {
+            return self.done.try_recv().map_err(|_| TransportError::Unplugged);
+        }
+        match self.done.recv_timeout(limit) {
+            Ok(transfer) => {
+                self.gone |= transfer.status == TransferStatus::Unplugged;
+                Ok(transfer)
+            }
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
+                Err(TransportError::TimedOut { what: "waiting for a transfer".into(), waited: limit })
+            }
+        }
+    }
+
+    fn in_flight(&self) -> usize {
+        self.shared.flights.count()
+    }
+
+    fn cancel(&mut self, limit: Duration) -> usize {
+        self.shared.flights.cancel();
+        let start = Instant::now();
+        while self.in_flight() > 0 && start.elapsed() < limit {
+            // Whatever comes back is dropped here; the short wait looks at the count again.
+            drop(self.done.recv_timeout(Duration::from_millis(10)));
+        }
+        while self.done.try_recv().is_ok() {}
+        self.in_flight()
+    }
+}
+
+impl Drop for LibusbDevice {
+    fn drop(&mut self) {
+        let left = self.cancel(PATIENCE);
+        if left > 0 {
+            tracing::warn!(device = %self.info, left, "transfers did not come back; their memory is left to the system");
+        }
+    }
+}
