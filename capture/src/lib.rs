@@ -2,6 +2,7 @@
 //!
 //! - [`Frame`]: depth and colour of one sensor at one time, with device and host time and the device's frame number;
 //! - [`Rig`] and [`Sensor`]: cameras, calibration, identity;
+//! - [`clock`]: which clock stamps frames, and its fit to the host's;
 //! - [`Source`]: what live devices, replay and the synthetic sensor have in common;
 //! - [`Recorder`] writes frames to an MCAP file, [`Replay`] is the file as a source; [`depth_codec`] packs depth;
 //! - [`import`](mod@import) reads other people's folders; [`Subject`] is a person's folder with its takes;
@@ -45,6 +46,7 @@
 //! ```
 
 pub mod atomic_write;
+pub mod clock;
 mod container;
 pub mod depth_codec;
 pub mod error;
@@ -63,6 +65,7 @@ pub mod subject;
 pub mod trajectory;
 
 pub use atomic_write::{atomic_write, atomic_write_with};
+pub use clock::{ClockDomain, ClockFit};
 pub use error::CaptureError;
 pub use frame::{ColorImage, DepthImage, Frame, RgbImage};
 pub use garment_type::GarmentType;

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
+use crate::ClockDomain;
+
 /// Who made the frames.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct DeviceIdentity {
@@ -12,6 +14,9 @@ pub struct DeviceIdentity {
     pub serial: String,
     /// Firmware version, empty where there is none.
     pub firmware: String,
+    /// The clock of its frames' device time.
+    #[serde(default)]
+    pub clock: ClockDomain,
 }
 
 /// One depth camera with its colour camera.

@@ -113,6 +113,7 @@ impl Take {
             model: format!("synthetic {}", preset.name()),
             serial: format!("SYN-{:08x}", self.settings.seed as u32),
             firmware: env!("CARGO_PKG_VERSION").into(),
+            ..DeviceIdentity::default()
         };
         let sensor = Sensor {
             name: "camera".into(),

@@ -7,8 +7,8 @@ use std::{
 };
 
 use toile_capture::{
-    CaptureError, ColorImage, DepthImage, DeviceIdentity, Frame, Recorder, RecorderOptions, RgbImage, Rig, Sensor,
-    Source,
+    CaptureError, ClockDomain, ColorImage, DepthImage, DeviceIdentity, Frame, Recorder, RecorderOptions, RgbImage, Rig,
+    Sensor, Source,
 };
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
@@ -29,7 +29,12 @@ pub fn rig(sensors: usize) -> Rig {
     let camera = PinholeCamera::ideal(WIDTH, HEIGHT, 20.1 / 3.0, 19.7, 11.5, 7.5);
     let sensor = |i: usize| Sensor {
         name: format!("camera{i}"),
-        identity: DeviceIdentity { model: "test".into(), serial: format!("{i}"), firmware: "1.2".into() },
+        identity: DeviceIdentity {
+            model: "test".into(),
+            serial: format!("{i}"),
+            firmware: "1.2".into(),
+            clock: ClockDomain::HostMonotonic,
+        },
         depth: camera,
         depth_scale: 0.001,
         color: Some(camera),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use toile_capture::{DeviceIdentity, Sensor};
+use toile_capture::{ClockDomain, DeviceIdentity, Sensor};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use crate::UvcDepthError;
@@ -38,7 +38,8 @@ fn parse(text: &str) -> Result<Sensor, String> {
     }
     Ok(Sensor {
         name: file.name.clone(),
-        identity: DeviceIdentity { model: file.name, ..DeviceIdentity::default() },
+        // V4L2 stamps buffers with the monotonic clock.
+        identity: DeviceIdentity { model: file.name, clock: ClockDomain::HostMonotonic, ..DeviceIdentity::default() },
         depth: file.camera,
         depth_scale: file.depth_scale,
         color: None,

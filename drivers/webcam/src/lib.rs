@@ -16,7 +16,7 @@ use nokhwa::{
     pixel_format::RgbFormat,
     utils::{ApiBackend, CameraIndex, FrameFormat, RequestedFormat, RequestedFormatType},
 };
-use toile_capture::{CaptureError, DeviceIdentity, Frame, Rig, Sensor, Source};
+use toile_capture::{CaptureError, ClockDomain, DeviceIdentity, Frame, Rig, Sensor, Source};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 /// Horizontal field of view assumed for an uncalibrated webcam, radians (60°, the usual for laptop cameras).
@@ -109,7 +109,8 @@ fn sensor(name: &str, width: u32, height: u32, fps: u32) -> Sensor {
         PinholeCamera::ideal(width, height, f, f, (f64::from(width) - 1.0) / 2.0, (f64::from(height) - 1.0) / 2.0);
     Sensor {
         name: name.to_string(),
-        identity: DeviceIdentity { model: name.to_string(), ..DeviceIdentity::default() },
+        // nokhwa turns the kernel's monotonic times into the wall clock's.
+        identity: DeviceIdentity { model: name.to_string(), clock: ClockDomain::HostUnix, ..DeviceIdentity::default() },
         depth: camera,
         depth_scale: 0.001,
         color: Some(camera),
