@@ -18,6 +18,8 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("toile-driver-stereo", &["toile-geometry", "toile-capture", "toile-stereo"]),
     ("toile-driver-synthetic", &["toile-geometry", "toile-capture", "toile-synthetic"]),
     ("toile-driver-transport", &[]),
+    ("toile-driver-kinect1", &["toile-geometry", "toile-capture", "toile-driver-transport"]),
+    ("toile-driver-models", &["toile-geometry", "toile-capture", "toile-synthetic", "toile-driver-transport"]),
     ("toile-driver-uvc-depth", &["toile-geometry", "toile-capture"]),
     ("toile-driver-webcam", &["toile-geometry", "toile-capture"]),
     ("v4l2-sys-mit", &[]),

@@ -1,0 +1,138 @@
+//! Depth and colour of one time to one pair. Nothing is dropped: what finds no partner goes on alone.
+
+use std::collections::VecDeque;
+
+/// Depth and colour that belong together, or one of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair<D, C> {
+    /// Depth and its time, nanoseconds of the device's clock.
+    pub depth: Option<(i64, D)>,
+    /// Colour and its time.
+    pub color: Option<(i64, C)>,
+}
+
+impl<D, C> Pair<D, C> {
+    /// Time of the depth, or of the colour where there is no depth.
+    pub fn time_ns(&self) -> i64 {
+        self.depth.as_ref().map(|d| d.0).or(self.color.as_ref().map(|c| c.0)).unwrap_or(0)
+    }
+}
+
+/// Pairs what is at most `most_apart_ns` apart. Each stream comes in the order of its time.
+#[derive(Debug)]
+pub struct Pairing<D, C> {
+    most_apart_ns: i64,
+    depth: Option<(i64, D)>,
+    color: Option<(i64, C)>,
+    ready: VecDeque<Pair<D, C>>,
+    alone: [u64; 2],
+}
+
+impl<D, C> Pairing<D, C> {
+    /// For streams whose partners are at most `most_apart_ns` apart: half the time between frames.
+    pub fn new(most_apart_ns: i64) -> Self {
+        Self { most_apart_ns, depth: None, color: None, ready: VecDeque::new(), alone: [0; 2] }
+    }
+
+    /// Takes depth.
+    pub fn push_depth(&mut self, time_ns: i64, depth: D) {
+        if let Some(waiting) = self.depth.replace((time_ns, depth)) {
+            self.give(Some(waiting), None);
+        }
+        self.meet();
+    }
+
+    /// Takes colour.
+    pub fn push_color(&mut self, time_ns: i64, color: C) {
+        if let Some(waiting) = self.color.replace((time_ns, color)) {
+            self.give(None, Some(waiting));
+        }
+        self.meet();
+    }
+
+    /// What waits for a partner goes on alone: no more will come.
+    pub fn finish(&mut self) {
+        let (depth, color) = (self.depth.take(), self.color.take());
+        for alone in [(depth, None), (None, color)] {
+            if alone.0.is_some() || alone.1.is_some() {
+                self.give(alone.0, alone.1);
+            }
+        }
+    }
+
+    /// The next pair that is ready.
+    pub fn pop(&mut self) -> Option<Pair<D, C>> {
+        self.ready.pop_front()
+    }
+
+    /// How many depth and colour images went on alone.
+    pub fn alone(&self) -> [u64; 2] {
+        self.alone
+    }
+
+    /// Pairs the two that wait, or lets the older one go: what follows it will be farther still.
+    fn meet(&mut self) {
+        let (Some(depth), Some(color)) = (&self.depth, &self.color) else { return };
+        let later = depth.0.saturating_sub(color.0);
+        if later.abs() <= self.most_apart_ns {
+            let (depth, color) = (self.depth.take(), self.color.take());
+            self.give(depth, color);
+        } else if later < 0 {
+            let depth = self.depth.take();
+            self.give(depth, None);
+        } else {
+            let color = self.color.take();
+            self.give(None, color);
+        }
+    }
+
+    fn give(&mut self, depth: Option<(i64, D)>, color: Option<(i64, C)>) {
+        self.alone[0] += u64::from(color.is_none());
+        self.alone[1] += u64::from(depth.is_none());
+        self.ready.push_back(Pair { depth, color });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    type Times = (Option<i64>, Option<i64>);
+
+    fn run(events: &[(bool, i64)]) -> (Vec<Times>, [u64; 2]) {
+        let mut pairing = Pairing::new(16);
+        for &(is_depth, time) in events {
+            if is_depth { pairing.push_depth(time, ()) } else { pairing.push_color(time, ()) }
+        }
+        pairing.finish();
+        let pairs = std::iter::from_fn(|| pairing.pop()).map(|p| (p.depth.map(|d| d.0), p.color.map(|c| c.0)));
+        let pairs = pairs.collect();
+        (pairs, pairing.alone())
+    }
+
+    #[test]
+    fn near_ones_pair_and_a_lost_one_leaves_its_partner_alone() {
+        let (pairs, alone) = run(&[(true, 0), (false, 3), (false, 36), (true, 66), (false, 69), (true, 99)]);
+        assert_eq!(pairs, [(Some(0), Some(3)), (None, Some(36)), (Some(66), Some(69)), (Some(99), None)]);
+        assert_eq!(alone, [1, 1]);
+    }
+
+    proptest! {
+        #[test]
+        fn everything_comes_out_once_and_pairs_are_near(steps in prop::collection::vec((any::<bool>(), 0..40i64), 0..60)) {
+            let mut times = [0, 0];
+            let events: Vec<(bool, i64)> = steps.into_iter().map(|(is_depth, step)| {
+                times[usize::from(is_depth)] += step;
+                (is_depth, times[usize::from(is_depth)])
+            }).collect();
+            let (pairs, _) = run(&events);
+            let depths: Vec<i64> = pairs.iter().filter_map(|p| p.0).collect();
+            let colors: Vec<i64> = pairs.iter().filter_map(|p| p.1).collect();
+            prop_assert_eq!(depths, events.iter().filter(|e| e.0).map(|e| e.1).collect::<Vec<_>>());
+            prop_assert_eq!(colors, events.iter().filter(|e| !e.0).map(|e| e.1).collect::<Vec<_>>());
+            prop_assert!(pairs.iter().all(|p| p.0.zip(p.1).is_none_or(|(d, c)| (d - c).abs() <= 16)));
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Models of depth cameras that stand in for hardware.
+//!
+//! A model answers what the camera would: descriptors, control requests, the next packet. What it sends is known, so what
+//! arrives can be compared pixel by pixel. The same model sits behind the in-process bus (every `cargo test`) and serves a
+//! real kernel over USB/IP (the wire tier). The models share no code with the drivers that they test.
+//!
+//! - [`kinect1`]: camera and motor of the first Kinect, with faults on demand;
+//! - [`descriptors`]: standard requests, for kernels.
+//!
+//! ```
+//! use std::sync::{Arc, Mutex};
+//! use toile_driver_models::kinect1::{CameraModel, Pattern};
+//! use toile_driver_transport::{Bus, twin::VirtualBus};
+//! let bus = VirtualBus::default();
+//! bus.plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()))));
+//! assert_eq!(bus.list().expect("a virtual bus can be read")[0].product, 0x02ae);
+//! ```
+
+pub mod descriptors;
+pub mod kinect1;
