@@ -51,6 +51,8 @@ pub struct Globals {
 pub enum Command {
     /// Bring a recorded folder into a subject as its next take
     Import(commands::import::Import),
+    /// Record a take from a camera, and see how much of the subject was seen
+    Capture(commands::capture::Capture),
     /// Tell what is in a recording, a folder or a subject, and whether it is healthy
     Inspect(commands::inspect::Inspect),
     /// Fuse takes into scans

@@ -5,6 +5,7 @@
 //!
 //! - [`cli`], [`commands`]: what can be asked;
 //! - [`pipeline`]: the stages in their order, each a file with what it reads and writes;
+//! - [`capture`](mod@capture): recording from a camera;
 //! - [`stage`]: a stage is skipped when its inputs, settings and version are what its record says;
 //! - [`report`]: the page that an operator reads;
 //! - [`outcome`]: how a command ended; `main` alone turns that into an exit code.
@@ -15,6 +16,7 @@
 //! assert_eq!(run(words), Outcome::Done);
 //! ```
 
+pub mod capture;
 pub mod cli;
 pub mod commands;
 pub mod disk;

@@ -75,6 +75,14 @@ impl Progress {
         self.show(&mut state, false);
     }
 
+    /// Tells what the running step sees, and how far it is.
+    pub fn tell(&self, label: &str, fraction: f32) {
+        let mut state = self.state();
+        state.label = label.to_string();
+        state.fraction = f64::from(fraction).clamp(state.fraction, 1.0);
+        self.show(&mut state, false);
+    }
+
     /// Ends the running step.
     pub fn end(&self) {
         let mut state = self.state();

@@ -46,6 +46,7 @@ impl Command {
     fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         match self {
             Self::Import(c) => c.run(session),
+            Self::Capture(c) => c.run(session),
             Self::Inspect(c) => c.run(session),
             Self::Fuse(c) => c.run(session),
             Self::Fit(c) => c.run(session),
@@ -63,6 +64,7 @@ impl Command {
     fn name(&self) -> &'static str {
         match self {
             Self::Import(_) => "import",
+            Self::Capture(_) => "capture",
             Self::Inspect(_) => "inspect",
             Self::Fuse(_) => "fuse",
             Self::Fit(_) => "fit",

@@ -13,7 +13,7 @@ use toile_driver_webcam as webcam;
 use crate::{StudioError, outcome::Answer, run::Session};
 
 const AFTER: &str = "\
-Streaming from the depth cameras on USB is not built in yet; UVC depth cameras (Z16, Y16) and webcams can be opened.
+`toile capture` records from the Kinect v1 and from UVC depth cameras (Z16, Y16); Kinect v2 and RealSense are only listed.
 
 Examples:
   toile devices

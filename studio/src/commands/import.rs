@@ -135,7 +135,7 @@ fn record(opened: &mut Opened, path: &Path, session: &Session) -> Result<ImportR
 }
 
 /// Takes back a subject that was created for a take that did not come; folders that hold anything stay.
-fn remove_empty(subject: &Path) {
+pub(crate) fn remove_empty(subject: &Path) {
     let has_takes = fs::read_dir(subject.join("takes")).is_ok_and(|mut entries| entries.next().is_some());
     if !has_takes {
         drop(fs::remove_file(subject.join("subject.toml")));

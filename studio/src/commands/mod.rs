@@ -1,5 +1,6 @@
 //! The commands, a file each: what it takes, what it calls, what it tells.
 
+pub mod capture;
 pub mod completions;
 pub mod demo;
 pub mod devices;

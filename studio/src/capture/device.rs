@@ -1,0 +1,121 @@
+//! `--device`, opened as a source of frames.
+
+use std::{path::PathBuf, str::FromStr};
+
+use toile_capture::{Layer, Replay, Source, Subject};
+use toile_driver_kinect1::{Kinect1, Settings};
+use toile_driver_synthetic::SyntheticDevice;
+use toile_driver_transport::libusb::LibusbBus;
+use toile_driver_uvc_depth::UvcDepthCamera;
+use toile_synthetic::{GarmentKind, GarmentSettings, SyntheticSettings};
+
+use crate::StudioError;
+
+/// Where frames come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Device {
+    /// The virtual sensor before a virtual person, who follows from the seed.
+    Synthetic(u64),
+    /// A recording.
+    Replay(PathBuf),
+    /// The first Kinect v1, or that with this serial number.
+    Kinect1(Option<String>),
+    /// A UVC depth camera: its node, and the file of its calibration.
+    Uvc(PathBuf, PathBuf),
+}
+
+/// Who sets the pace.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// The device: frames come when they come, and nothing may hold them up.
+    Live,
+    /// We: the next frame comes when it is asked for, so the preview can see every one.
+    OnDemand,
+}
+
+impl FromStr for Device {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (kind, rest) = text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest)));
+        match (kind, rest) {
+            ("synthetic", None) => Ok(Self::Synthetic(1)),
+            ("synthetic", Some(seed)) => {
+                seed.parse().map(Self::Synthetic).map_err(|_| format!("`{seed}` is no seed; give a whole number"))
+            }
+            ("replay", Some(file)) => Ok(Self::Replay(file.into())),
+            ("kinect1", serial) => Ok(Self::Kinect1(serial.map(String::from))),
+            ("uvc", Some(rest)) => {
+                let (node, file) = rest.split_once(',').ok_or("write uvc:/dev/video2,calibration.toml")?;
+                Ok(Self::Uvc(node.into(), file.into()))
+            }
+            _ => Err("choose of kinect1[:SERIAL], uvc:NODE,CALIBRATION, replay:FILE, synthetic[:SEED]".into()),
+        }
+    }
+}
+
+impl Device {
+    /// Who sets the pace.
+    pub fn pace(&self) -> Pace {
+        match self {
+            Self::Synthetic(_) | Self::Replay(_) => Pace::OnDemand,
+            Self::Kinect1(_) | Self::Uvc(..) => Pace::Live,
+        }
+    }
+
+    /// Opens it for a take of `subject` that will be `layer`.
+    ///
+    /// # Errors
+    /// [`StudioError`] says what is missing and what to do.
+    pub fn open(&self, subject: &Subject, layer: &Layer) -> Result<Box<dyn Source>, StudioError> {
+        let failed = |reason: String| StudioError::Device(reason);
+        match self {
+            Self::Synthetic(seed) => {
+                let settings = synthetic(*seed, subject, layer)?;
+                let opened = SyntheticDevice::open(&settings, layer.number);
+                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+            }
+            Self::Replay(file) => Ok(Box::new(Replay::open(file)?)),
+            Self::Kinect1(serial) => {
+                let bus = LibusbBus::new().map_err(|e| failed(e.to_string()))?;
+                let opened = Kinect1::open(&bus, serial.as_deref(), Settings::default());
+                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+            }
+            Self::Uvc(node, calibration) => {
+                let opened = UvcDepthCamera::open(node, calibration);
+                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+            }
+        }
+    }
+}
+
+/// The virtual person wears what the subject's layers are called.
+fn synthetic(seed: u64, subject: &Subject, layer: &Layer) -> Result<SyntheticSettings, StudioError> {
+    let worn = subject.layers().iter().take(layer.number).chain([layer]).skip(1);
+    let names: Vec<&str> = if layer.number == 0 { Vec::new() } else { worn.map(|l| l.name.as_str()).collect() };
+    let garment = |name: &&str| {
+        let kinds = GarmentKind::ALL.map(GarmentKind::name).join(", ");
+        let unknown = || StudioError::Usage(format!("--layer: the virtual person has no `{name}`; choose of {kinds}"));
+        GarmentKind::from_name(name).map(GarmentSettings::of).ok_or_else(unknown)
+    };
+    let garments = names.iter().map(garment).collect::<Result<_, _>>()?;
+    let name = subject.name().to_string();
+    Ok(SyntheticSettings { name, seed, garments, ..SyntheticSettings::default() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_by_their_names() {
+        assert_eq!("synthetic".parse(), Ok(Device::Synthetic(1)));
+        assert_eq!("synthetic:42".parse(), Ok(Device::Synthetic(42)));
+        assert_eq!("kinect1:A1".parse(), Ok(Device::Kinect1(Some("A1".into()))));
+        assert_eq!("replay:a:b.mcap".parse(), Ok(Device::Replay("a:b.mcap".into())));
+        assert_eq!("uvc:/dev/video2,c.toml".parse(), Ok(Device::Uvc("/dev/video2".into(), "c.toml".into())));
+        for wrong in ["kinect9", "synthetic:x", "replay", "uvc:/dev/video2", ""] {
+            assert!(wrong.parse::<Device>().is_err(), "{wrong}");
+        }
+    }
+}

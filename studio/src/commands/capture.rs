@@ -1,0 +1,143 @@
+//! `toile capture`: a take from a camera, watched while it is recorded.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{Arc, atomic::AtomicBool},
+};
+
+use serde_json::json;
+use signal_hook::{consts::SIGINT, flag};
+use toile_capture::{GarmentType, PendingTake, Subject};
+
+use crate::{
+    StudioError,
+    capture::{Device, Recorded, Stop, record},
+    commands::import::remove_empty,
+    outcome::Answer,
+    run::Session,
+};
+
+const AFTER: &str = "\
+The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
+Devices: kinect1[:SERIAL], uvc:NODE,CALIBRATION (a UVC depth camera), replay:FILE, synthetic[:SEED].
+The take ends after one full turn, after --seconds, or with Ctrl-C; whatever came is kept.
+
+Examples:
+  toile capture --subject anna --layer body
+  toile capture --subject anna --layer trousers --type trousers --seconds 40
+  toile capture --subject anna --layer trousers --retake
+  toile capture --subject olga --layer body --device synthetic";
+
+/// Record a take from a camera, and see how much of the subject was seen
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Capture {
+    /// The subject's folder
+    #[arg(long, value_name = "DIR")]
+    subject: PathBuf,
+    /// What the take adds, without a number: body, trousers, shirt, ...
+    #[arg(long, value_name = "NAME")]
+    layer: String,
+    /// What garment it is: top, trousers, skirt, dress, jacket, other
+    #[arg(long = "type", value_name = "TYPE")]
+    garment: Option<GarmentType>,
+    /// Where frames come from
+    #[arg(long, value_name = "DEVICE", default_value = "kinect1")]
+    device: Device,
+    /// Stop after so many seconds
+    #[arg(long, value_name = "N", conflicts_with = "one_turn")]
+    seconds: Option<f64>,
+    /// Stop after one full turn of the subject (what happens when nothing else is said)
+    #[arg(long)]
+    one_turn: bool,
+    /// Replace the layer's take; the old one is kept under takes/rejected/
+    #[arg(long)]
+    retake: bool,
+}
+
+impl Capture {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where the device cannot be opened or the take cannot be written; the subject is then as it was.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        if self.seconds.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
+            return Err(StudioError::Usage("--seconds must be above 0".into()));
+        }
+        let is_new = !Subject::exists(&self.subject);
+        let mut subject = Subject::open_or_create(&self.subject)?;
+        let captured = self.capture(&mut subject, session);
+        if captured.is_err() && is_new {
+            remove_empty(&self.subject);
+        }
+        let (recorded, take, kept) = captured?;
+        Ok(self.answer(&recorded, &take, kept))
+    }
+
+    fn capture(
+        &self,
+        subject: &mut Subject,
+        session: &Session,
+    ) -> Result<(Recorded, PathBuf, Option<PathBuf>), StudioError> {
+        let pending: PendingTake = if self.retake {
+            subject.retake(&self.layer, self.garment)?
+        } else {
+            subject.next_take(&self.layer, self.garment)?
+        };
+        let source = self.device.open(subject, &pending.layer)?;
+        let model = source.rig().sensors.first().map(|s| s.identity.model.clone()).unwrap_or_default();
+        session.progress.plan(1.0);
+        session.progress.begin(&format!("{}: capture", pending.layer.label()), 1.0);
+        let stop = self.seconds.map_or(Stop::AfterOneTurn, Stop::After);
+        let how = (stop, self.device.pace());
+        let pressed = interrupted()?;
+        let recorded = record(source, &pending.path, how, &pressed, &session.progress)?;
+        let take = subject.take_path(&pending.layer);
+        let kept = subject.accept(pending)?;
+        if subject.rig().is_empty() {
+            subject.set_rig(&model)?;
+        }
+        session.progress.end();
+        Ok((recorded, take, kept))
+    }
+
+    fn answer(&self, recorded: &Recorded, take: &Path, kept: Option<PathBuf>) -> Answer {
+        let Recorded { frames, bytes, lost, unpaired, broken, failed, seen } = recorded;
+        let (angle, unseen) = (seen.turn.angle().to_degrees(), seen.turn.unseen());
+        let mut text = format!("{}: {frames} frames, turned {angle:.0}°\n", take.display());
+        if let Some(kept) = &kept {
+            text.push_str(&format!("the old take is kept as {}\n", kept.display()));
+        }
+        let mut warnings = Vec::new();
+        if let Some(failed) = failed {
+            warnings.push(format!("{failed} (the take has every frame that came)"));
+        }
+        if *lost > 0 {
+            warnings.push(format!("{lost} frames were lost between camera and computer; the others are whole"));
+        }
+        if *unpaired > 0 {
+            warnings.push(format!("{unpaired} frames have only depth or only colour"));
+        }
+        if !seen.turn.is_full() {
+            let sides = if unseen.is_empty() { String::new() } else { format!("; not seen: {}", unseen.join(", ")) };
+            warnings.push(format!(
+                "the preview followed {angle:.0}° of the turn{sides}; record again with --retake where a side is missing"
+            ));
+        }
+        let results = json!({
+            "take": take, "frames": frames, "bytes": bytes, "lost": lost, "unpaired": unpaired, "kept": kept,
+            "turned_degrees": angle, "unseen": unseen, "ended": failed,
+            "preview": { "fused": seen.fused, "unplaced": seen.unplaced, "skipped": seen.skipped },
+        });
+        Answer { text, results, warnings, lost: broken.clone(), ..Answer::default() }
+    }
+}
+
+/// True once Ctrl-C was pressed; a second time ends the program at once (the `.part` stays readable).
+fn interrupted() -> Result<Arc<AtomicBool>, StudioError> {
+    let pressed = Arc::new(AtomicBool::new(false));
+    flag::register_conditional_shutdown(SIGINT, 1, pressed.clone())
+        .and_then(|_| flag::register(SIGINT, pressed.clone()))
+        .map_err(|e| StudioError::Device(format!("Ctrl-C cannot be watched: {e}")))?;
+    Ok(pressed)
+}
