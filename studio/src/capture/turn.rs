@@ -58,6 +58,11 @@ impl Turn {
         self.angle() >= TAU + OVERLAP
     }
 
+    /// True where the turn came round as far as the preview can tell: within 5°.
+    pub fn came_round(&self) -> bool {
+        self.angle() >= TAU - 0.09
+    }
+
     /// Sides that were not seen yet, in words.
     pub fn unseen(&self) -> Vec<&'static str> {
         if self.seen.is_empty() {

@@ -118,7 +118,7 @@ impl Capture {
         if *unpaired > 0 {
             warnings.push(format!("{unpaired} frames have only depth or only colour"));
         }
-        if !seen.turn.is_full() {
+        if !seen.turn.came_round() {
             let sides = if unseen.is_empty() { String::new() } else { format!("; not seen: {}", unseen.join(", ")) };
             warnings.push(format!(
                 "the preview followed {angle:.0}° of the turn{sides}; record again with --retake where a side is missing"

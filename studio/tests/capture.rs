@@ -1,0 +1,155 @@
+//! `toile capture`: what it records, how it stops, what an unplugged camera leaves.
+
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod common;
+
+use std::{
+    fs,
+    path::Path,
+    process::Stdio,
+    sync::{Arc, Mutex, atomic::AtomicBool},
+    time::{Duration, Instant},
+};
+
+use common::{exits, toile};
+use toile_capture::{CaptureError, Frame, Replay, Rig, Source};
+use toile_driver_kinect1::{Kinect1, Settings};
+use toile_driver_models::kinect1::{CameraModel, Fault, Pattern, Stream, StreamFault};
+use toile_driver_transport::twin::VirtualBus;
+use toile_studio::{
+    Progress,
+    capture::{Pace, Stop, record},
+};
+
+fn frames(path: &Path) -> Vec<Frame> {
+    let replay = Replay::open(path).unwrap();
+    assert!(replay.lost().is_none());
+    (0..replay.len()).map(|i| replay.frame(i).unwrap()).collect()
+}
+
+fn kinect(faults: Vec<Fault>) -> Box<dyn Source> {
+    let bus = VirtualBus::default();
+    bus.plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()).with_faults(faults))));
+    Box::new(Kinect1::open(&bus, None, Settings::default()).unwrap())
+}
+
+#[test]
+fn a_take_ends_after_its_seconds_and_a_retake_of_its_replay_is_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let subject = dir.path().join("olga");
+    let mut first = toile();
+    first
+        .args(["capture", "--layer", "body", "--device", "synthetic:5", "--seconds", "0.9", "--subject"])
+        .arg(&subject);
+    let told = exits(0, &mut first);
+    let take = subject.join("takes/00-body.mcap");
+    let recorded = frames(&take);
+    // Five a second: stopped at the first frame after 0.9 s, at most a queue later.
+    assert!((5..10).contains(&recorded.len()), "{}", recorded.len());
+    assert_eq!(told["results"]["frames"], recorded.len());
+    assert!(told["warnings"][0].as_str().unwrap().contains("of the turn"));
+    let mut again = toile();
+    let copy = dir.path().join("copy.mcap");
+    fs::copy(&take, &copy).unwrap();
+    let device = format!("replay:{}", copy.display());
+    again.args(["capture", "--layer", "body", "--retake", "--device", &device, "--subject"]).arg(&subject);
+    exits(0, &mut again);
+    assert!(frames(&take) == recorded);
+    assert!(frames(&subject.join("takes/rejected/00-body.1.mcap")) == recorded);
+}
+
+#[test]
+fn ctrl_c_finishes_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let subject = dir.path().join("olga");
+    let mut command = toile();
+    command.args(["capture", "--quiet", "--layer", "body", "--device", "synthetic", "--subject"]).arg(&subject);
+    let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+    let part = subject.join("takes/00-body.mcap.part");
+    let start = Instant::now();
+    while !part.exists() && start.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(700));
+    let pressed = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(pressed.success());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    let recorded = frames(&subject.join("takes/00-body.mcap"));
+    assert!(!recorded.is_empty() && recorded.len() < 100 && !part.exists());
+}
+
+#[test]
+fn a_camera_that_is_not_there_leaves_no_subject_and_a_sentence() {
+    let dir = tempfile::tempdir().unwrap();
+    let subject = dir.path().join("olga");
+    let mut command = toile();
+    command.args(["capture", "--layer", "body", "--device", "kinect1:NONE", "--subject"]).arg(&subject);
+    let told = exits(1, &mut command);
+    let message = told["error"]["message"].as_str().unwrap();
+    assert!(message.contains("not plugged in") || message.contains("/dev/bus/usb"), "{message}");
+    assert!(!subject.exists());
+    let mut wrong = toile();
+    wrong.args(["capture", "--layer", "body", "--device", "kinect7", "--subject"]).arg(&subject);
+    exits(2, &mut wrong);
+}
+
+#[test]
+fn an_unplug_ends_the_take_with_every_frame_that_came() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("take.mcap");
+    let unplug = Fault { stream: Stream::Depth, frame: 12, packet: 60, what: StreamFault::Unplug };
+    let lost = Fault { stream: Stream::Depth, frame: 4, packet: 60, what: StreamFault::Lost(2) };
+    let progress = Progress::new(true);
+    let how = (Stop::AfterOneTurn, Pace::Live);
+    let recorded = record(kinect(vec![lost, unplug]), &path, how, &AtomicBool::new(false), &progress).unwrap();
+    let frames = frames(&path);
+    assert!(recorded.failed.unwrap().contains("unplugged"));
+    assert_eq!((recorded.frames, frames.len() as u64), (12, 12));
+    assert_eq!((recorded.lost, recorded.unpaired), (0, 1));
+    assert!(frames.iter().zip(0..).all(|(f, k)| f.device_frame == k));
+}
+
+#[test]
+fn a_camera_that_gives_nothing_leaves_no_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("take.mcap");
+    let unplug = Fault { stream: Stream::Depth, frame: 0, packet: 0, what: StreamFault::Unplug };
+    let how = (Stop::AfterOneTurn, Pace::Live);
+    let error = record(kinect(vec![unplug]), &path, how, &AtomicBool::new(false), &Progress::new(true)).unwrap_err();
+    assert!(error.to_string().contains("unplugged"));
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+}
+
+/// Gives the same frame as fast as it is asked for.
+struct Fast {
+    frame: Frame,
+    rig: Rig,
+    left: u64,
+}
+
+impl Source for Fast {
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
+        self.left = self.left.saturating_sub(1);
+        self.frame.device_frame += 1;
+        self.frame.color = None;
+        Ok((self.left > 0).then(|| self.frame.clone()))
+    }
+}
+
+#[test]
+fn what_the_preview_cannot_keep_up_with_is_recorded_all_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("take.mcap");
+    let mut camera = kinect(Vec::new());
+    let (rig, frame) = (camera.rig().clone(), camera.next_frame().unwrap().unwrap());
+    let source = Box::new(Fast { frame, rig, left: 151 });
+    let how = (Stop::AfterOneTurn, Pace::Live);
+    let recorded = record(source, &path, how, &AtomicBool::new(false), &Progress::new(true)).unwrap();
+    assert_eq!((recorded.frames, Replay::open(&path).unwrap().len()), (150, 150));
+    assert!(recorded.seen.fused + recorded.seen.unplaced + recorded.seen.skipped <= 150);
+}
