@@ -77,7 +77,7 @@ pub struct Settings {
     /// How long a command may take. Default 0.5 s (Linux' gspca `kinect.c` gives as much).
     pub command_limit: Duration,
     /// After so long without a frame the streams are switched off and on once; after as long again that is an error.
-    /// Default 1 s.
+    /// Default 2 s.
     pub frame_limit: Duration,
 }
 
@@ -90,7 +90,7 @@ impl Default for Settings {
             transfers: 16,
             packets: 32,
             command_limit: Duration::from_millis(500),
-            frame_limit: Duration::from_secs(1),
+            frame_limit: Duration::from_secs(2),
         }
     }
 }
@@ -352,7 +352,8 @@ impl Kinect1 {
     }
 
     fn step(&mut self) -> Result<(), Kinect1Error> {
-        match self.device.wait(self.settings.frame_limit) {
+        // Bus time decides; the clock only where transfers themselves no longer come back.
+        match self.device.wait(3 * self.settings.frame_limit) {
             Ok(transfer) => self.take(transfer)?,
             Err(TransportError::TimedOut { .. }) => self.quiet = u64::MAX,
             Err(other) => return Err(other.into()),

@@ -5,7 +5,7 @@
 //! real kernel over USB/IP (the wire tier). The models share no code with the drivers that they test.
 //!
 //! - [`kinect1`]: camera and motor of the first Kinect, with faults on demand;
-//! - [`descriptors`]: standard requests, for kernels.
+//! - [`descriptors`]: standard requests, for kernels; [`usbip`]: a model behind USB/IP.
 //!
 //! ```
 //! use std::sync::{Arc, Mutex};
@@ -18,3 +18,4 @@
 
 pub mod descriptors;
 pub mod kinect1;
+pub mod usbip;

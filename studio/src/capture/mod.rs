@@ -1,7 +1,7 @@
 //! Recording a take: the camera's thread, the recorder, and the live preview, each at its own pace.
 //!
 //! - [`device`]: what was asked for, opened as a source of frames;
-//! - [`record`]: frames go to the file in the order they come; none is dropped here;
+//! - [`record`](mod@record): frames go to the file in the order they come; none is dropped here;
 //! - [`preview`]: a thread that fuses what it can keep up with; its queue drops the oldest;
 //! - [`turn`]: how far the subject has turned, and which sides were not seen yet;
 //! - [`status`]: the live line.
