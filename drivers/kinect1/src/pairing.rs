@@ -18,12 +18,16 @@ impl<D, C> Pair<D, C> {
     }
 }
 
-/// Pairs what is at most `most_apart_ns` apart. Each stream comes in the order of its time.
+/// So many of a stream wait for the other to bring their partners; beyond that the oldest goes on alone.
+const MOST_WAITING: usize = 3;
+
+/// Pairs what is at most `most_apart_ns` apart. Each stream comes in the order of its time, and may come a few frames
+/// after the other.
 #[derive(Debug)]
 pub struct Pairing<D, C> {
     most_apart_ns: i64,
-    depth: Option<(i64, D)>,
-    color: Option<(i64, C)>,
+    depth: VecDeque<(i64, D)>,
+    color: VecDeque<(i64, C)>,
     ready: VecDeque<Pair<D, C>>,
     alone: [u64; 2],
 }
@@ -31,33 +35,25 @@ pub struct Pairing<D, C> {
 impl<D, C> Pairing<D, C> {
     /// For streams whose partners are at most `most_apart_ns` apart: half the time between frames.
     pub fn new(most_apart_ns: i64) -> Self {
-        Self { most_apart_ns, depth: None, color: None, ready: VecDeque::new(), alone: [0; 2] }
+        let (depth, color, ready) = (VecDeque::new(), VecDeque::new(), VecDeque::new());
+        Self { most_apart_ns, depth, color, ready, alone: [0; 2] }
     }
 
     /// Takes depth.
     pub fn push_depth(&mut self, time_ns: i64, depth: D) {
-        if let Some(waiting) = self.depth.replace((time_ns, depth)) {
-            self.give(Some(waiting), None);
-        }
-        self.meet();
+        self.depth.push_back((time_ns, depth));
+        self.meet(MOST_WAITING);
     }
 
     /// Takes colour.
     pub fn push_color(&mut self, time_ns: i64, color: C) {
-        if let Some(waiting) = self.color.replace((time_ns, color)) {
-            self.give(None, Some(waiting));
-        }
-        self.meet();
+        self.color.push_back((time_ns, color));
+        self.meet(MOST_WAITING);
     }
 
     /// What waits for a partner goes on alone: no more will come.
     pub fn finish(&mut self) {
-        let (depth, color) = (self.depth.take(), self.color.take());
-        for alone in [(depth, None), (None, color)] {
-            if alone.0.is_some() || alone.1.is_some() {
-                self.give(alone.0, alone.1);
-            }
-        }
+        self.meet(0);
     }
 
     /// The next pair that is ready.
@@ -70,26 +66,25 @@ impl<D, C> Pairing<D, C> {
         self.alone
     }
 
-    /// Pairs the two that wait, or lets the older one go: what follows it will be farther still.
-    fn meet(&mut self) {
-        let (Some(depth), Some(color)) = (&self.depth, &self.color) else { return };
-        let later = depth.0.saturating_sub(color.0);
-        if later.abs() <= self.most_apart_ns {
-            let (depth, color) = (self.depth.take(), self.color.take());
-            self.give(depth, color);
-        } else if later < 0 {
-            let depth = self.depth.take();
-            self.give(depth, None);
-        } else {
-            let color = self.color.take();
-            self.give(None, color);
+    /// Pairs the oldest two where they are near, and lets the older one go where they are not: what follows in the
+    /// other stream is farther still. At most `waiting` of one stream wait for the other.
+    fn meet(&mut self, waiting: usize) {
+        loop {
+            let later = self.depth.front().zip(self.color.front()).map(|(d, c)| d.0.saturating_sub(c.0));
+            let (gives_depth, gives_color) = match later {
+                Some(later) if later.abs() <= self.most_apart_ns => (true, true),
+                Some(later) => (later < 0, later > 0),
+                None => (self.depth.len() > waiting, self.color.len() > waiting),
+            };
+            if !gives_depth && !gives_color {
+                return;
+            }
+            let depth = if gives_depth { self.depth.pop_front() } else { None };
+            let color = if gives_color { self.color.pop_front() } else { None };
+            self.alone[0] += u64::from(color.is_none());
+            self.alone[1] += u64::from(depth.is_none());
+            self.ready.push_back(Pair { depth, color });
         }
-    }
-
-    fn give(&mut self, depth: Option<(i64, D)>, color: Option<(i64, C)>) {
-        self.alone[0] += u64::from(color.is_none());
-        self.alone[1] += u64::from(depth.is_none());
-        self.ready.push_back(Pair { depth, color });
     }
 }
 
@@ -117,6 +112,15 @@ mod tests {
         let (pairs, alone) = run(&[(true, 0), (false, 3), (false, 36), (true, 66), (false, 69), (true, 99)]);
         assert_eq!(pairs, [(Some(0), Some(3)), (None, Some(36)), (Some(66), Some(69)), (Some(99), None)]);
         assert_eq!(alone, [1, 1]);
+    }
+
+    #[test]
+    fn a_stream_that_comes_a_few_frames_after_the_other_still_pairs() {
+        let ahead = (0..3).map(|i| (false, i * 33 + 3));
+        let then = (0..20).flat_map(|i| [(true, i * 33), (false, (i + 3) * 33 + 3)]);
+        let (pairs, alone) = run(&ahead.chain(then).collect::<Vec<_>>());
+        assert!(pairs[..20].iter().all(|p| p.0.is_some() && p.1.is_some()));
+        assert_eq!(alone, [0, 3]);
     }
 
     proptest! {

@@ -168,7 +168,9 @@ impl State {
     }
 
     fn isochronous(&mut self, model: &mut dyn DeviceModel, urb: &Urb) -> Option<Done> {
-        let clock = self.clocks.entry(urb.endpoint).or_default();
+        // Bus time is one for all endpoints: one that starts later starts now.
+        let now = self.clocks.values().copied().max().unwrap_or(0);
+        let clock = self.clocks.entry(urb.endpoint).or_insert(now);
         let mut done = Done { status: 0, data: Vec::new(), packets: Vec::new(), sent: 0 };
         for (_, room) in &urb.packets {
             let answer = model.isochronous(urb.endpoint, *clock, *room as usize);
