@@ -81,6 +81,7 @@ impl Subject {
             pose: &self.poses[n],
             pose0: &self.poses[0],
             garment_type: None,
+            edits: None,
         };
         let clock = Instant::now();
         let found = extract(&take, &ExtractSettings::default(), &|_| ())?;

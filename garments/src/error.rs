@@ -12,4 +12,7 @@ pub enum GarmentError {
     /// A mesh breaks its own rules.
     #[error("{0}")]
     Mesh(String),
+    /// Edits that cannot be used.
+    #[error("{0}")]
+    Edits(String),
 }

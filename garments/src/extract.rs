@@ -14,6 +14,7 @@ use crate::{
     ExtractSettings, GarmentError, GarmentType,
     body_parts::{BodyPart, PART_COUNT, part_of},
     clean, common_frame, cut,
+    edits::{Applied, Edits},
     evidence::{self, Evidence},
     hem,
     labels::{self, Labels},
@@ -26,6 +27,8 @@ use crate::{
 const OPENING: f32 = 0.15;
 /// Scan this far inside what was worn before means that something is missing, metres.
 const SUNKEN: f32 = 0.012;
+/// A sunken surface faces as what was worn before does, up to this angle (cosine).
+const SUNKEN_FACING: f32 = 0.5;
 /// So much sunken area makes a warning, square metres.
 const SUNKEN_AREA: f32 = 0.03;
 /// Cloth this near to the inner thigh follows it, metres.
@@ -58,6 +61,8 @@ pub struct Take<'a> {
     pub pose0: &'a Pose,
     /// The garment's type where it was told.
     pub garment_type: Option<GarmentType>,
+    /// Corrections by hand.
+    pub edits: Option<&'a Edits>,
 }
 
 /// What an operator should know about a layer.
@@ -123,6 +128,8 @@ pub struct ExtractionReport {
     pub color_noise: f32,
     /// Separate pieces.
     pub pieces: usize,
+    /// Area whose label the edits changed, square metres.
+    pub edited_m2: f32,
 }
 
 /// Finds the new garment of a take, cuts it out and brings it to the common frame.
@@ -146,15 +153,17 @@ pub fn extract(
     clean::settle_filled(take.scan, &graph, &evidence, &mut labels, &bones(take));
     let pieces = clean::drop_islands(&graph, &mut labels, settings);
     progress(0.6);
-    let in_take = garment_mesh(take, &graph, &labels, settings);
+    let applied = take.edits.map(|e| e.apply(take.scan, &graph, &evidence, &mut labels, settings));
+    let in_take = garment_mesh(take, &graph, &labels, applied.as_ref(), settings);
     progress(0.8);
     let weights = common_frame::weights(take, &in_take, settings);
     let garment = common_frame::to_common_frame(take, &in_take, &weights);
-    let mut warnings = warnings(&graph, &evidence, &in_take);
+    let mut warnings = warnings(&graph, &evidence, &labels, &in_take);
     if looks_like_two(take, &graph, &evidence, &labels) {
         warnings.push(Warning::TwoAtOnce);
     }
-    let report = report(take, &in_take, &evidence, garment_type, pieces);
+    let mut report = report(take, &in_take, &evidence, garment_type, pieces);
+    report.edited_m2 = applied.map_or(0.0, |a| a.changed_m2);
     progress(1.0);
     Ok(Extraction { labels, in_take, garment, weights, report, warnings })
 }
@@ -170,7 +179,7 @@ fn check(take: &Take) -> Result<(), GarmentError> {
     if vertices != weights {
         return Err(GarmentError::Mismatch(format!("the body has {vertices} vertices but weights for {weights}")));
     }
-    Ok(())
+    take.edits.map_or(Ok(()), |edits| edits.check().and_then(|()| edits.check_on(take.scan)))
 }
 
 /// Labels with the told type's template, or first with none, then with that of the guessed type.
@@ -287,17 +296,27 @@ fn front_is_open(take: &Take, labels: &Labels) -> bool {
 }
 
 /// The garment's own mesh: cut along the smoothed border, islands dropped, holes closed, remeshed.
-fn garment_mesh(take: &Take, graph: &ScanGraph, labels: &Labels, settings: &ExtractSettings) -> Mesh {
+fn garment_mesh(
+    take: &Take,
+    graph: &ScanGraph,
+    labels: &Labels,
+    edits: Option<&Applied>,
+    settings: &ExtractSettings,
+) -> Mesh {
     if !labels.garment.contains(&true) {
         return Mesh::default();
     }
-    let field = cut::smooth_field(graph, &take.scan.positions, &labels.garment, settings.hem_smoothing);
+    let mut field = cut::smooth_field(graph, &take.scan.positions, &labels.garment, settings.hem_smoothing);
+    let mut unseen = unseen_around(graph, take.scan);
+    if let Some(edits) = edits {
+        follow_edits(edits, &mut field, &mut unseen, settings.hem_smoothing);
+    }
     let mut scan = take.scan.clone();
     scan.normals.clear();
     scan.attributes.retain(|name, _| name == "filled");
     scan.attributes.entry("filled".into()).or_insert_with(|| vec![0.0; graph.len()]);
     scan.attributes.insert("confidence".into(), labels.confidence.clone());
-    scan.attributes.insert(FREE.into(), unseen_around(graph, take.scan));
+    scan.attributes.insert(FREE.into(), unseen);
     let bones = bones(take);
     clean::close_hidden(&mut scan, &labels.garment, &bones);
     let mut mesh = cut::cut_positive(&scan, &field);
@@ -310,6 +329,14 @@ fn garment_mesh(take: &Take, graph: &ScanGraph, labels: &Labels, settings: &Extr
     untangle::untangle(&mut mesh);
     mesh.recompute_normals();
     mesh
+}
+
+/// The field's zero line runs along hem lines; an edited rim stays where it was put.
+fn follow_edits(edits: &Applied, field: &mut [f32], unseen: &mut [f32], smoothing: f32) {
+    for (f, d) in field.iter_mut().zip(&edits.hem_distance).filter(|(_, d)| d.is_finite()) {
+        *f = (d / smoothing.max(1e-4)).clamp(-1.0, 1.0);
+    }
+    unseen.iter_mut().zip(&edits.near).filter(|(_, near)| **near).for_each(|(u, _)| *u = 0.0);
 }
 
 /// 1 where the scan ends or was closed without being seen, less around it.
@@ -334,17 +361,26 @@ fn bones(take: &Take) -> Vec<[Point3<f32>; 2]> {
     JOINTS.iter().filter_map(|j| Some([at[j.parent()?.index()].cast::<f32>(), at[j.index()].cast::<f32>()])).collect()
 }
 
-fn warnings(graph: &ScanGraph, evidence: &Evidence, garment: &Mesh) -> Vec<Warning> {
+fn warnings(graph: &ScanGraph, evidence: &Evidence, labels: &Labels, garment: &Mesh) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if garment.is_empty() {
         warnings.push(Warning::NothingNew);
     }
-    let sunken = SUNKEN.max(4.0 * evidence.height_noise);
-    let area: f32 = (0..graph.len()).filter(|&v| evidence.height[v] < -sunken).map(|v| graph.areas[v]).sum();
+    let area = sunken_area(graph, evidence, labels);
     if area > SUNKEN_AREA {
         warnings.push(Warning::TakenOff(area));
     }
     warnings
+}
+
+/// Area that lies well inside what was worn before. New cloth may press in what is below it, and what nobody saw then or
+/// now tells nothing.
+fn sunken_area(graph: &ScanGraph, evidence: &Evidence, labels: &Labels) -> f32 {
+    let sunken = SUNKEN.max(4.0 * evidence.height_noise);
+    let seen = |v: usize| graph.filled[v] < 0.5 && (graph.lab.is_empty() || !evidence.color[v].is_nan());
+    let inside = |&v: &usize| evidence.height[v] < -sunken && evidence.facing[v] > SUNKEN_FACING;
+    let area = |v: usize| graph.areas[v];
+    (0..graph.len()).filter(|&v| seen(v) && !labels.garment[v]).filter(inside).map(area).sum()
 }
 
 fn report(
@@ -374,5 +410,6 @@ fn report(
         height_noise_m: evidence.height_noise,
         color_noise: evidence.color_noise,
         pieces,
+        edited_m2: 0.0,
     }
 }

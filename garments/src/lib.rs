@@ -10,6 +10,8 @@
 //! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
 //! 5. [`mod@stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests.
 //!
+//! [`edits`] are corrections by hand, applied to the labels each time.
+//!
 //! [`extract`](extract::extract) runs 1 to 4 for one take; [`stack`](stack::stack) runs 5 over all layers.
 //!
 //! ```
@@ -22,6 +24,7 @@ pub mod clean;
 pub mod color;
 pub mod common_frame;
 pub mod cut;
+pub mod edits;
 pub mod error;
 pub mod evidence;
 pub mod extract;
@@ -37,6 +40,7 @@ pub mod stack;
 pub mod surface_solve;
 pub mod untangle;
 
+pub use edits::Edits;
 pub use error::GarmentError;
 pub use extract::{Extraction, Take, Warning, extract};
 pub use garment_type::GarmentType;

@@ -2,7 +2,11 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use toile_character::{JOINT_COUNT, Joint, Pose, Skeleton, SkinWeights, skinning};
-use toile_garments::{ExtractSettings, GarmentError, GarmentType, StackSettings, Take, Warning, extract, stack};
+use toile_garments::{
+    Edits, ExtractSettings, GarmentError, GarmentType, StackSettings, Take, Warning,
+    edits::{self, HemLine, Mark, Stroke},
+    extract, stack,
+};
 use toile_geometry::{
     Mesh,
     bvh::Bvh,
@@ -89,6 +93,7 @@ fn take<'a>(person: &'a Person, scan: &'a Mesh, previous: &'a Mesh, pose: &'a Po
         pose,
         pose0: pose,
         garment_type: Some(GarmentType::Other),
+        edits: None,
     }
 }
 
@@ -275,4 +280,129 @@ fn any_number_of_threads_gives_the_same_bytes() {
         })
     };
     assert_eq!(run(1), run(2));
+}
+
+fn stroke(mark: Mark, at: Point3<f32>, radius: f32) -> Edits {
+    let stroke = Stroke { mark, points: vec![at.into()], radius };
+    Edits { version: edits::VERSION, strokes: vec![stroke], hems: Vec::new() }
+}
+
+#[test]
+fn a_stroke_changes_its_neighbourhood_and_nothing_else() {
+    let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
+    let run = |edits: Option<&Edits>| {
+        let take = Take { edits, ..take(&person, &scan, &before, &pose) };
+        extract(&take, &ExtractSettings::default(), &|_| ()).unwrap()
+    };
+    let plain = run(None);
+    for (mark, y) in [(Mark::DoesNotBelong, 0.75), (Mark::Belongs, 0.82)] {
+        let (at, radius) = (Point3::new(0.0, y, RADIUS + 0.005), 0.03);
+        let edited = run(Some(&stroke(mark, at, radius)));
+        for (v, p) in scan.positions.iter().enumerate() {
+            let (was, is) = (plain.labels.garment[v], edited.labels.garment[v]);
+            let far = (p - at).norm();
+            assert!(far < edits::GROWTH * radius || was == is, "{p} changed, {far} m from the stroke");
+            assert!(far > radius || is == (mark == Mark::Belongs), "{p} was touched and did not follow");
+        }
+        assert!(edited.report.edited_m2 > 0.0005);
+        // The mesh is the same surface away from the stroke.
+        let bvh = Bvh::new(&plain.garment.positions, &plain.garment.triangles);
+        let away = edited.garment.positions.iter().filter(|p| (*p - at).norm() > edits::GROWTH * radius + 0.03);
+        let worst = away.map(|p| bvh.closest(p, 1.0).unwrap().distance).fold(0.0, f32::max);
+        assert!(worst < 0.0015, "{worst}");
+    }
+}
+
+#[test]
+fn the_hem_follows_a_line() {
+    let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
+    let height = |a: f32| 0.785 + 0.01 * (2.0 * a).sin();
+    let points: Vec<[f32; 3]> = (0..=60)
+        .map(|i| i as f32 % 60.0 / 60.0 * std::f32::consts::TAU)
+        .map(|a| [0.13 * a.sin(), height(a), 0.13 * a.cos()])
+        .collect();
+    let hems = vec![HemLine { points, reach: 0.035 }];
+    let edits = Edits { version: edits::VERSION, strokes: Vec::new(), hems };
+    let take = Take { edits: Some(&edits), ..take(&person, &scan, &before, &pose) };
+    let found = extract(&take, &ExtractSettings::default(), &|_| ()).unwrap();
+    let top = boundary_loops(&found.garment.triangles)
+        .into_iter()
+        .find(|l| found.garment.positions[l[0] as usize].y > 0.6)
+        .unwrap();
+    for p in top.iter().map(|&v| found.garment.positions[v as usize]) {
+        assert!((p.y - height(p.x.atan2(p.z))).abs() < 0.003, "{p}");
+    }
+}
+
+#[test]
+fn bad_edits_are_refused_by_name() {
+    let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
+    let good = stroke(Mark::Belongs, Point3::new(0.0, 0.5, RADIUS + 0.01), 0.03);
+    let refuse = |change: &dyn Fn(&mut Edits)| {
+        let mut bad = good.clone();
+        change(&mut bad);
+        let take = Take { edits: Some(&bad), ..take(&person, &scan, &before, &pose) };
+        extract(&take, &ExtractSettings::default(), &|_| ()).unwrap_err().to_string()
+    };
+    assert!(refuse(&|e| e.version = 9).contains("version 9"));
+    assert!(refuse(&|e| e.strokes[0].radius = 3.0).contains("stroke 1"));
+    assert!(refuse(&|e| e.strokes[0].points.clear()).contains("0 points"));
+    assert!(refuse(&|e| e.strokes[0].points[0][1] = f32::NAN).contains("no number"));
+    assert!(refuse(&|e| e.strokes[0].points[0][2] = 0.5).contains("off the scan"));
+    let line = HemLine { points: vec![[0.0, 0.5, RADIUS]], reach: 0.02 };
+    assert!(refuse(&|e| e.hems.push(line.clone())).contains("hem line 1 has 1 points"));
+}
+
+/// As `iou`, for truth given by a rule.
+fn iou_of(scan: &Mesh, labels: &[bool], truth: impl Fn(&Point3<f32>) -> bool) -> f64 {
+    let both = scan.positions.iter().zip(labels).filter(|(p, l)| truth(p) && **l).count();
+    let either = scan.positions.iter().zip(labels).filter(|(p, l)| truth(p) || **l).count();
+    both as f64 / either.max(1) as f64
+}
+
+#[test]
+fn black_cloth_with_dropouts_is_found_and_the_unseen_marked() {
+    let (person, pose, before) = (person(), Pose::identity(), bare());
+    let mut scan = dressed(0.008, [14, 14, 16]);
+    let centers: Vec<Point3<f32>> = (0..40)
+        .map(|k| (k as f32 * 2.4, 0.33 + 0.44 * k as f32 / 40.0))
+        .map(|(a, y)| Point3::new(RADIUS * a.sin(), y, RADIUS * a.cos()))
+        .collect();
+    let dropped = |p: &Point3<f32>| centers.iter().any(|c| (p - c).norm() < 0.03);
+    let filled: Vec<f32> = scan.positions.iter().map(|p| f32::from(u8::from(dropped(p)))).collect();
+    let share = filled.iter().sum::<f32>() / filled.len() as f32;
+    assert!(share > 0.1, "{share}");
+    scan.attributes.insert("filled".into(), filled);
+    let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    assert!(iou(&scan, &found.labels.garment) > 0.97, "{}", iou(&scan, &found.labels.garment));
+    assert!(found.report.filled_share > 0.2 && found.report.openings_m.len() == 2, "{:?}", found.report);
+}
+
+#[test]
+fn an_open_jacket_has_one_rim() {
+    let (person, pose, before) = (person(), Pose::identity(), bare());
+    let cloth = |p: &Point3<f32>| inside(p.y) && p.x.atan2(p.z).abs() > 0.5;
+    let mut scan = bare();
+    for v in 0..scan.positions.len() {
+        let p = scan.positions[v];
+        if cloth(&p) {
+            let (a, at) = (p.x.atan2(p.z), RADIUS + 0.01);
+            scan.positions[v] = Point3::new(at * a.sin(), p.y, at * a.cos());
+            scan.colors[v] = BLUE;
+        }
+    }
+    let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    assert!(iou_of(&scan, &found.labels.garment, cloth) > 0.96);
+    assert_eq!(found.report.openings_m.len(), 1, "{:?}", found.report);
+}
+
+#[test]
+fn two_garments_at_once_are_one_layer_with_a_warning() {
+    let (person, pose, before) = (person(), Pose::identity(), bare());
+    let cloth = |y: f32| (0.08..0.28).contains(&y) || (0.5..0.72).contains(&y);
+    let radius = |y: f32, a: f32| RADIUS + noise(y, a) + if cloth(y) { 0.008 } else { 0.0 };
+    let scan = column(radius, |y| if cloth(y) { BLUE } else { SKIN });
+    let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    assert_eq!((found.report.pieces, &found.warnings[..]), (2, &[Warning::TwoAtOnce][..]));
+    assert_eq!(boundary_loops(&found.garment.triangles).len(), 4);
 }

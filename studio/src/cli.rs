@@ -63,6 +63,8 @@ pub enum Command {
     Measure(commands::measure::Measure),
     /// Cut the garments out of the dressed scans and stack them
     Extract(commands::extract::Extract),
+    /// Correct a garment by hand: strokes that belong to it or do not, and lines that its hem follows
+    Edit(commands::edit::Edit),
     /// Write the avatar: GLB with a motion, VRM; or a take in a plain encoding
     Export(commands::export::Export),
     /// Everything from recorded takes to avatar and report: runs whatever is missing

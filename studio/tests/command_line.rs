@@ -13,9 +13,19 @@ fn help_shows_the_usual_way_and_every_command_has_an_example() {
     };
     let text = help(&["--help"]);
     assert!(text.contains("toile process anna") && text.contains("Exit codes"), "{text}");
-    for command in
-        ["import", "inspect", "fuse", "fit", "extract", "export", "process", "demo", "synthesize", "completions"]
-    {
+    for command in [
+        "import",
+        "inspect",
+        "fuse",
+        "fit",
+        "extract",
+        "edit",
+        "export",
+        "process",
+        "demo",
+        "synthesize",
+        "completions",
+    ] {
         assert!(text.contains(command), "{command} is not in the help");
         let own = help(&[command, "--help"]);
         assert!(own.contains("Example") && own.contains(&format!("toile {command}")), "{own}");
@@ -68,4 +78,24 @@ fn a_motion_that_cannot_be_used_is_said_before_any_work() {
     assert!(message.contains("snake.bvh") && message.contains("joint"), "{message}");
     let answer = exits(1, toile().args(["process", "anna", "--motion", "no/such.bvh"]));
     assert!(answer["error"]["message"].as_str().unwrap().contains("no/such.bvh"), "{answer}");
+}
+
+#[test]
+fn edits_that_cannot_be_used_are_named_and_not_kept() {
+    let recording = common::Recording::new(3, 3);
+    exits(0, toile().args(recording.import("body")));
+    let file = recording.folder().join("edits.json");
+    for (text, says) in [
+        ("{", "no edits"),
+        (r#"{"version": 2}"#, "version 2"),
+        (r#"{"version": 1, "stroke": []}"#, "stroke"),
+        (r#"{"version": 1, "strokes": [{"mark": "belongs", "points": [], "radius": 0.1}]}"#, "stroke 1"),
+        (r#"{"version": 1, "hems": [{"points": [[0, 0, 0], [0, 1, 0]], "reach": 9}]}"#, "hem line 1"),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let answer = exits(1, toile().arg("edit").arg(recording.subject()).args(["body", "--strokes"]).arg(&file));
+        let message = answer["error"]["message"].as_str().unwrap();
+        assert!(message.contains("edits.json") && message.contains(says), "{answer}");
+        assert!(!recording.subject().join("edits").exists());
+    }
 }

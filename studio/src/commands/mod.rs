@@ -4,6 +4,7 @@ pub mod capture;
 pub mod completions;
 pub mod demo;
 pub mod devices;
+pub mod edit;
 pub mod export;
 pub mod extract;
 pub mod fit;

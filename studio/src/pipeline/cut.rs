@@ -1,11 +1,13 @@
 //! Stage `cut`: the new garment out of a dressed take's scan.
 //!
-//! Reads the scan, the scan of the take before, both poses and the body. Writes `cut.ply`, the garment in the take's
+//! Reads the scan, the scan of the take before, both poses, the body, and the layer's edits where there are any. Writes `cut.ply`, the garment in the take's
 //! own pose and frame, and `unstacked.ply`, the same in the common frame with its skin weights as vertex attributes.
+
+use std::path::Path;
 
 use serde_json::json;
 use toile_fitting::rigged_scan;
-use toile_garments::{ExtractSettings, Extraction, Take, Warning, extract};
+use toile_garments::{Edits, ExtractSettings, Extraction, Take, Warning, extract};
 use toile_geometry::ply;
 
 use crate::{
@@ -33,21 +35,24 @@ pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
     let (layer, before) = (run.layers[n].as_str(), run.layers[n - 1].as_str());
     let settings = ExtractSettings::default();
     let paths = [layer, before].map(|l| (folders.scan(l), folders.pose(l)));
+    let edits_path = Some(folders.edits(layer)).filter(|p| p.exists());
+    let edits = edits_path.as_deref().map(read_edits).transpose()?;
+    let decides = [
+        paths[0].0.clone(),
+        paths[0].1.clone(),
+        paths[1].0.clone(),
+        paths[1].1.clone(),
+        folders.body_rest(),
+        folders.body_json(),
+        folders.pose(run.first_layer()),
+    ];
     let stage = Stage {
         name: "cut",
         version: VERSION,
         cost: COST,
         root: &folders.root,
         folder: folders.layer(layer),
-        inputs: vec![
-            paths[0].0.clone(),
-            paths[0].1.clone(),
-            paths[1].0.clone(),
-            paths[1].1.clone(),
-            folders.body_rest(),
-            folders.body_json(),
-            folders.pose(run.first_layer()),
-        ],
+        inputs: decides.into_iter().chain(edits_path).collect(),
         settings: json!({ "extract": plain(&settings)?, "type": told }),
         outputs: vec![folders.cut(layer), folders.unstacked(layer)],
         outputs_vary: false,
@@ -65,10 +70,23 @@ pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
             pose: &pose,
             pose0: &body.pose0,
             garment_type: told,
+            edits: edits.as_ref(),
         };
         let found = extract(&take, &settings, progress).map_err(|e| StudioError::stage(&paths[0].0, e))?;
         product(run, layer, &found)
     })
+}
+
+/// Reads and checks a layer's edits.
+///
+/// # Errors
+/// [`StudioError::Format`] where the file is no edits, and why.
+pub fn read_edits(path: &Path) -> Result<Edits, StudioError> {
+    let bytes = std::fs::read(path).map_err(|e| StudioError::io(path, e))?;
+    let edits: Edits =
+        serde_json::from_slice(&bytes).map_err(|e| StudioError::format(path, format!("no edits: {e}")))?;
+    edits.check().map_err(|e| StudioError::format(path, e))?;
+    Ok(edits)
 }
 
 fn product(run: &Run, layer: &str, found: &Extraction) -> Result<Product, StudioError> {

@@ -40,6 +40,11 @@ impl Folders {
         self.layer(layer).join("body.ply")
     }
 
+    /// Corrections by hand of a layer; there need not be any.
+    pub fn edits(&self, layer: &str) -> PathBuf {
+        self.root.join("edits").join(format!("{layer}.json"))
+    }
+
     /// The garment as it was cut, in the take's own pose and frame.
     pub fn cut(&self, layer: &str) -> PathBuf {
         self.layer(layer).join("cut.ply")

@@ -1,0 +1,87 @@
+//! `toile edit`: corrections of a garment by hand.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use toile_garments::Edits;
+
+use crate::{
+    StudioError,
+    commands::{must_exist, reach},
+    disk,
+    outcome::Answer,
+    pipeline::{self, Goal, Options, Run, cut::read_edits},
+    run::Session,
+    stage::pretty,
+};
+
+const AFTER: &str = "\
+FILE is JSON. Points are metres in the frame of SUBJECT/build/LAYER/scan.ply and lie on it:
+  { \"version\": 1,
+    \"strokes\": [ { \"mark\": \"belongs\", \"points\": [[0.1, 1.2, 0.13]], \"radius\": 0.03 },
+                 { \"mark\": \"does-not-belong\", \"points\": [[0, 1.4, 0.1], [0.02, 1.41, 0.1]], \"radius\": 0.01 } ],
+    \"hems\": [ { \"points\": [[-0.1, 0.9, 0.1], [0.1, 0.9, 0.1]], \"reach\": 0.02 } ] }
+A stroke decides what its radius touches and moves the border up to twice as far; a hem line moves the hem within its
+reach onto itself. Nothing else changes. The edits are kept in SUBJECT/edits/ and applied at each rebuild.
+
+Examples:
+  toile edit anna trousers --strokes hem.json
+  toile edit anna trousers --strokes more.json --add
+  toile edit anna trousers --clear";
+
+/// Correct a garment by hand: strokes that belong to it or do not, and lines that its hem follows
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Edit {
+    /// The subject
+    subject: PathBuf,
+    /// The layer, such as `trousers` or `01-trousers`
+    layer: String,
+    /// The edits; they take the place of those that the layer had
+    #[arg(long, value_name = "FILE", required_unless_present = "clear")]
+    strokes: Option<PathBuf>,
+    /// Keep the edits that the layer has, and add these
+    #[arg(long, requires = "strokes")]
+    add: bool,
+    /// Forget the layer's edits
+    #[arg(long, conflicts_with = "strokes")]
+    clear: bool,
+}
+
+impl Edit {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where the edits cannot be used (nothing is stored then), or a stage has no answer.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        must_exist(&self.subject)?;
+        let edits = self.strokes.as_deref().map(|file| read_edits(file).map(|e| (file, e))).transpose()?;
+        let options = Options { last_layer: Some(self.layer.clone()), ..Options::default() };
+        pipeline::process(&self.subject, Goal::Scans, &options, &session.progress)?;
+        self.store(edits, session)?;
+        reach(&self.subject, Goal::Garments, &Options::default(), session)
+    }
+
+    /// Puts the edits where the layer's rebuild finds them.
+    fn store(&self, edits: Option<(&Path, Edits)>, session: &Session) -> Result<(), StudioError> {
+        let run = Run::open(&self.subject, Some(&self.layer), &session.progress)?;
+        let layer = run.layers.last().map_or("", String::as_str);
+        if layer == run.first_layer() {
+            return Err(StudioError::Usage(format!("{layer} is the body: only garments have edits")));
+        }
+        let path = run.folders.edits(layer);
+        let Some((file, mut edits)) = edits else {
+            return if path.exists() { fs::remove_file(&path).map_err(|e| StudioError::io(&path, e)) } else { Ok(()) };
+        };
+        edits.check_on(&run.read_mesh(&run.folders.scan(layer))?).map_err(|e| StudioError::format(file, e))?;
+        if self.add && path.exists() {
+            let Edits { strokes, hems, .. } = std::mem::take(&mut edits);
+            edits = read_edits(&path)?;
+            edits.strokes.extend(strokes);
+            edits.hems.extend(hems);
+        }
+        disk::write_whole(&path, &pretty(&edits)?)
+    }
+}
