@@ -45,4 +45,4 @@ pub use error::GarmentError;
 pub use extract::{Extraction, Take, Warning, extract};
 pub use garment_type::GarmentType;
 pub use settings::{ExtractSettings, StackSettings};
-pub use stack::{LayerReport, StackReport, stack};
+pub use stack::{GAP_BINS_MM, LayerReport, StackReport, stack};

@@ -34,6 +34,9 @@ const PATIENCE: usize = 10;
 /// Lower vertices in a parallel chunk.
 const CHUNK: usize = 512;
 
+/// Upper ends of the bins of [`LayerReport::gaps`], millimetres.
+pub const GAP_BINS_MM: [f32; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
+
 /// What stacking did to one layer.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct LayerReport {
@@ -47,6 +50,9 @@ pub struct LayerReport {
     pub self_crossings: [usize; 2],
     /// Least height of the layer's vertices over any lower layer, metres.
     pub least_gap_m: f32,
+    /// Share of its vertices by their height over the nearest lower layer: bins end at [`GAP_BINS_MM`], the last is
+    /// further away or over nothing.
+    pub gaps: [f32; GAP_BINS_MM.len() + 1],
     /// Mean distance that its vertices moved, metres.
     pub moved_mean_m: f32,
     /// Largest distance that a vertex moved, metres.
@@ -126,7 +132,9 @@ fn push_out(upper: &mut Mesh, lowers: &[LowerSurface], settings: &StackSettings)
     }
     report.crossing_pairs = lowers.iter().map(|l| crossings(upper, l.mesh, &l.bvh).len()).sum();
     report.self_crossings = [own_before, own_crossings(upper)];
-    report.least_gap_m = least_gap(upper, lowers, settings);
+    let heights = heights(upper, lowers, settings);
+    report.least_gap_m = heights.iter().copied().fold(settings.reach, f32::min);
+    report.gaps = histogram(&heights);
     let moved: Vec<f32> = upper.positions.iter().zip(&start).map(|(a, b)| (a - b).norm()).collect();
     report.moved_mean_m = moved.iter().sum::<f32>() / moved.len().max(1) as f32;
     report.moved_max_m = moved.iter().copied().fold(0.0, f32::max);
@@ -157,13 +165,20 @@ fn own_crossings(mesh: &Mesh) -> usize {
     self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles)).len()
 }
 
-fn least_gap(upper: &Mesh, lowers: &[LowerSurface], settings: &StackSettings) -> f32 {
-    let heights: Vec<f32> = upper
-        .positions
-        .par_iter()
-        .flat_map_iter(|p| lowers.iter().filter_map(|l| l.height(p, settings.reach).map(|h| h.value)))
-        .collect();
-    heights.into_iter().fold(settings.reach, f32::min)
+/// Height of every vertex over the lower layer that it is nearest to; infinite over none.
+fn heights(upper: &Mesh, lowers: &[LowerSurface], settings: &StackSettings) -> Vec<f32> {
+    let least =
+        |p| lowers.iter().filter_map(|l| l.height(p, settings.reach)).map(|h| h.value).fold(f32::INFINITY, f32::min);
+    upper.positions.par_iter().map(least).collect()
+}
+
+fn histogram(heights: &[f32]) -> [f32; GAP_BINS_MM.len() + 1] {
+    let mut shares = [0.0; GAP_BINS_MM.len() + 1];
+    for h in heights {
+        let bin = GAP_BINS_MM.iter().position(|end| h * 1e3 < *end).unwrap_or(GAP_BINS_MM.len());
+        shares[bin] += 1.0 / heights.len() as f32;
+    }
+    shares
 }
 
 /// Remembers how far each sample is from needing a push, so that a round looks only at those that may.

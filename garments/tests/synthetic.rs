@@ -242,6 +242,7 @@ fn stacked_layers_have_their_gap_and_cross_nowhere() {
     for (k, layer) in report.layers.iter().enumerate() {
         assert!(layer.settled && layer.crossing_pairs == 0, "layer {k}: {layer:?}");
         assert!(layer.least_gap_m >= 0.001, "layer {k}: {layer:?}");
+        assert!((layer.gaps.iter().sum::<f32>() - 1.0).abs() < 1e-3 && layer.gaps[0] == 0.0, "{:?}", layer.gaps);
         assert!(layer.self_crossings[1] <= layer.self_crossings[0]);
     }
     let all = [&body, &layers[0], &layers[1]];

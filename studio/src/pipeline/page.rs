@@ -88,9 +88,17 @@ fn contents(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Re
         scans: read_all(&takes, &|l| folders.scan(l))?,
         motion: motion_frames(run, body, &body_mesh, &garments, &moved)?,
         body: body_mesh,
+        gaps: gaps(&worn, summary),
         garments,
         seconds: seconds(run),
     })
+}
+
+/// What stacking says of each garment's gaps.
+fn gaps(garments: &[&str], summary: &Summary) -> Vec<(String, Vec<f64>)> {
+    let stacked = summary.stages.iter().find(|s| s.0 == "layers/stack").map_or(Value::Null, |s| s.1.result.clone());
+    let shares = |k: usize| stacked["layers"][k]["gaps"].as_array().into_iter().flatten().filter_map(Value::as_f64);
+    garments.iter().enumerate().map(|(k, l)| (l.to_string(), shares(k).collect())).collect()
 }
 
 /// What each take's records say, in figures.
@@ -101,6 +109,7 @@ fn take_row(layer: &str, summary: &Summary) -> TakeRow {
     };
     let (fuse, cut) = (found("fuse"), found("cut"));
     let number = |value: &Value, digits: usize| value.as_f64().map_or("–".into(), |x| format!("{x:.digits$}"));
+    let percent = |value: &Value| value.as_f64().map_or("–".into(), |x| format!("{:.1}", 100.0 * x));
     let dropped = fuse["dropped"].as_array().map_or("–".into(), |d| d.len().to_string());
     let kind = cut["garment_type"].as_str().unwrap_or("–").to_string();
     let guessed = if cut["type_guessed"] == true { " (guessed)" } else { "" };
@@ -115,6 +124,8 @@ fn take_row(layer: &str, summary: &Summary) -> TakeRow {
             ("unseen, %", number(&fuse["filled_percent"], 1)),
             ("garment", format!("{kind}{guessed}")),
             ("area, m²", number(&cut["area_m2"], 2)),
+            ("filled, %", percent(&cut["filled_share"])),
+            ("unsure, %", percent(&cut["unsure_share"])),
         ],
     }
 }

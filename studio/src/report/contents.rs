@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use toile_garments::GAP_BINS_MM;
 use toile_geometry::Mesh;
 use toile_render::RenderError;
 
@@ -39,6 +40,8 @@ pub struct Contents {
     pub body: Mesh,
     /// The garments in the same pose and frame by layer name.
     pub garments: Vec<(String, Mesh)>,
+    /// Of each garment, the share of its vertices by their gap to the layers below (bins as in stacking's report).
+    pub gaps: Vec<(String, Vec<f64>)>,
     /// All layers at some times of the motion, with a caption each.
     pub motion: Vec<(String, Vec<Mesh>)>,
     /// Seconds by stage name.
@@ -82,10 +85,13 @@ pub fn write(contents: &Contents, at: &Path, progress: &(dyn Fn(f32) + Sync)) ->
     let rows: Vec<Vec<String>> = contents.measurements.iter().map(|(k, v)| vec![k.clone(), v.clone()]).collect();
     page.table(&["measurement", "value"], &rows);
     progress(0.8);
-    page.section("Garments", "Each as it was cut out, alone and on the body.");
+    page.section("Garments", "Each as it was cut out, alone and on the body; how sure its border is; what was filled.");
+    page.pictures(&drawn(pictures::exploded(&layers))?)?;
+    gaps_table(&mut page, &contents.gaps);
     for (layer, garment) in &contents.garments {
         page.subsection(layer);
         page.pictures(&drawn(pictures::garment(garment, &contents.body))?)?;
+        page.pictures(&drawn(pictures::doubts(garment))?)?;
     }
     page.section("Time", "Seconds of each stage when it last ran.");
     let rows: Vec<Vec<String>> = contents.seconds.iter().map(|(k, v)| vec![k.clone(), format!("{v:.1}")]).collect();
@@ -102,6 +108,16 @@ fn worries(page: &mut Page, contents: &Contents) {
     if quiet {
         page.notes("good", &["Nothing: every take is whole, every stage trusts its result.".into()]);
     }
+}
+
+/// Per cent of each garment's vertices by their gap to what is below.
+fn gaps_table(page: &mut Page, gaps: &[(String, Vec<f64>)]) {
+    let ends = GAP_BINS_MM.map(|end| format!("below {end} mm"));
+    let head: Vec<&str> =
+        ["gap, % of vertices"].into_iter().chain(ends.iter().map(String::as_str)).chain(["more"]).collect();
+    let cells = |shares: &[f64]| shares.iter().map(|s| format!("{:.1}", 100.0 * s)).collect::<Vec<_>>();
+    let rows: Vec<Vec<String>> = gaps.iter().map(|(l, s)| [vec![l.clone()], cells(s)].concat()).collect();
+    page.table(&head, &rows);
 }
 
 fn takes_table(page: &mut Page, takes: &[TakeRow]) {

@@ -21,6 +21,8 @@ const DISTANCE: &str = "distance_mm";
 /// Colour and radius (metres) of the tapes on the body.
 const TAPE: [u8; 3] = [200, 30, 40];
 const CORD_RADIUS: f32 = 0.004;
+/// Space between layers that are drawn apart, metres.
+const BETWEEN: f32 = 0.1;
 /// Colour of the body under a garment.
 const SKIN: [u8; 3] = [205, 190, 178];
 
@@ -104,6 +106,43 @@ pub fn garment(garment: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderError>
     pictures.push(one(&on_body, &View::front(), "on the body, front")?);
     pictures.push(one(&on_body, &View::around(PI, 0.0), "on the body, back")?);
     Ok(pictures)
+}
+
+/// Where a garment's label is unsure (dark) and what nobody saw of it (bright).
+///
+/// # Errors
+/// [`RenderError`] where the mesh cannot be drawn.
+pub fn doubts(garment: &Mesh) -> Result<Vec<Picture>, RenderError> {
+    let mut pictures = Vec::new();
+    for (name, range, caption) in [("confidence", (0.5, 1.0), "how sure"), ("filled", (0.0, 1.0), "filled")] {
+        if garment.attributes.contains_key(name) {
+            let drawn = [Drawn::attribute(garment, name, range)];
+            for (heading, side) in [(0.0, "front"), (PI, "back")] {
+                pictures.push(one(&drawn, &View::around(heading, 0.0), &format!("{caption}, {side}"))?);
+            }
+        }
+    }
+    Ok(pictures)
+}
+
+/// All layers beside one another, inside to outside from left to right.
+///
+/// # Errors
+/// [`RenderError`] where a mesh cannot be drawn.
+pub fn exploded(layers: &[&Mesh]) -> Result<Vec<Picture>, RenderError> {
+    let mut right = 0.0;
+    let mut apart = Vec::new();
+    for mesh in layers {
+        let Some((low, high)) = mesh.bounds() else { continue };
+        let mut moved = Mesh::clone(mesh);
+        moved.positions.iter_mut().for_each(|p| p.x += right - low.x);
+        right += high.x - low.x + BETWEEN;
+        apart.push(moved);
+    }
+    let drawn: Vec<Drawn> = apart.iter().map(Drawn::colored).collect();
+    let width = SIZE.0 * layers.len().clamp(1, 6) as u32;
+    let image = picture(&drawn, &View::front(), width, SIZE.1)?;
+    Ok(vec![Picture { caption: "all layers apart, front".into(), image }])
 }
 
 /// All layers together from front, side and back.
