@@ -20,13 +20,13 @@ use toile_fusion::{
     depth_filter::drop_edges,
     fuse,
     integrate::integrate,
-    normals::normals_from_depth,
+    normals::surface_elements,
     raycast::ray_cast,
     surface::extract_surface,
     survey,
     track::track,
     tsdf::Tsdf,
-    view::{CutDepth, View, rectified_depth},
+    view::{CutDepth, Rectifier, View},
 };
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
@@ -86,9 +86,11 @@ impl Material {
         let figure = Scene { with_floor: false, with_wall: false, ..scene.clone() };
         let angles = steps(FRAMES, STEP_DEG);
         let view = |frame: &Frame| {
-            let (camera, depth) = rectified_depth(frame.depth.as_ref().unwrap(), &figure.rig().sensors[0], 6.0);
-            let mut view = CutDepth::new(&camera, &drop_edges(&camera, &depth, 8.3), 0.001).view(2);
-            view.colors = view.normals.iter().map(|n| n.map(|c| 128 + (100.0 * c) as u8)).collect();
+            let rectifier = Rectifier::new(&figure.rig().sensors[0], 6.0);
+            let depth = rectifier.rectify(frame.depth.as_ref().unwrap());
+            let mut view =
+                CutDepth::new(&rectifier.camera, &drop_edges(&rectifier.camera, &depth, 8.3), 0.001).view(2);
+            view.colors = view.elements.iter().map(|[_, n @ ..]| n.map(|c| (128.0 + 100.0 * c) as u8)).collect();
             view
         };
         Self {
@@ -125,14 +127,14 @@ fn steps_of_a_frame(c: &mut Criterion<CpuTime>, m: &Material) {
     group.sample_size(20);
     let settings = FusionSettings::default();
     let camera = m.scene.camera;
-    let sensor = &m.scene.rig().sensors[0];
-    let raw: Vec<Vec<f32>> =
-        m.frames.iter().map(|f| rectified_depth(f.depth.as_ref().unwrap(), sensor, 6.0).1).collect();
+    let rectifier = Rectifier::new(&m.scene.rig().sensors[0], 6.0);
+    let raw: Vec<Vec<f32>> = m.frames.iter().map(|f| rectifier.rectify(f.depth.as_ref().unwrap())).collect();
+    let cut: Vec<Vec<f32>> = m.views.iter().map(|v| v.elements.iter().map(|e| e[0]).collect()).collect();
     group.bench_function(format!("filter/{}", m.size), |b| {
         each(b, |i| drop_edges(&camera, &raw[i], settings.jump_slope));
     });
     group.bench_function(format!("normals/{}", m.size), |b| {
-        each(b, |i| normals_from_depth(&m.views[i].camera, &m.views[i].depth, 2));
+        each(b, |i| surface_elements(&m.views[i].camera, &cut[i], 2));
     });
     for (name, with_color) in [("integrate", false), ("integrate-colour", true)] {
         let mut field = m.model(with_color);

@@ -11,7 +11,7 @@ use toile_geometry::{Rigid, transform_point};
 use crate::{
     normals::dot,
     track::{Normal, Sample, increment, samples},
-    view::{View, is_measured},
+    view::View,
 };
 
 /// Points of a frame used in each pair.
@@ -131,11 +131,7 @@ fn match_pixel(view: &View, p: &Point3<f32>, normal: [f32; 3], gate: f32) -> Opt
         return None;
     }
     let i = v as usize * camera.width as usize + u as usize;
-    let n = view.normals[i];
-    if !is_measured(view.depth[i]) || dot(n, normal) < 0.7 {
-        return None;
-    }
-    let q = view.point(i);
+    let (q, n) = view.element(i).filter(|(_, n)| dot(*n, normal) >= 0.7)?;
     let d = [p.x - q[0], p.y - q[1], p.z - q[2]];
     let r = dot(n, d);
     let cosine = -dot(n, q) / dot(q, q).sqrt();

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 use toile_geometry::camera::PinholeCamera;
 
 use crate::{
-    normals::normals_from_depth,
-    view::{is_measured, unproject},
+    normals::{normal_of, surface_elements},
+    view::unproject,
 };
 
 /// Largest angle between the floor's normal and the image's upward direction, as a cosine (40°).
@@ -62,14 +62,16 @@ pub fn find_floor(camera: &PinholeCamera, background: &[f32], subject: &[Point3<
 
 fn upward_pixels(camera: &PinholeCamera, background: &[f32]) -> Vec<Upward> {
     let (w, h) = (camera.width as usize, camera.height as usize);
-    let normals = normals_from_depth(camera, background, 3);
+    let elements = surface_elements(camera, background, 3);
     let mut pixels = Vec::new();
     for y in (0..h).step_by(2) {
         for x in (0..w).step_by(2) {
-            let i = y * w + x;
-            if is_measured(background[i]) && -normals[i][1] > UPWARD {
-                let p = unproject(camera, x as f32, y as f32, background[i]);
-                pixels.push(Upward { point: Point3::from(p).cast(), normal: Vector3::from(normals[i]).cast() });
+            let element = &elements[y * w + x];
+            let [rx, ry, _] = unproject(camera, x as f32, y as f32, 1.0);
+            let normal = normal_of(element, rx, ry);
+            if element[0] > 0.0 && -normal[1] > UPWARD {
+                let point = Point3::new(rx, ry, 1.0) * element[0];
+                pixels.push(Upward { point: point.cast(), normal: Vector3::from(normal).cast() });
             }
         }
     }

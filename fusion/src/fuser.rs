@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use toile_capture::{ColorImage, Frame, Rig, Sensor};
-use toile_geometry::{Mesh, Rigid, camera::PinholeCamera};
+use toile_geometry::{Mesh, Rigid};
 
 use crate::{
     FusionError, FusionSettings, Prior,
@@ -17,7 +17,7 @@ use crate::{
     surface::extract_surface,
     track::{Tracked, approach, register, samples, track},
     tsdf::Tsdf,
-    view::{CutDepth, View, is_measured, rectified_depth},
+    view::{CutDepth, Rectifier, View, is_measured},
     volume::SubjectVolume,
 };
 
@@ -66,6 +66,7 @@ pub(crate) struct Kept {
 pub struct Fuser {
     pub(crate) settings: FusionSettings,
     pub(crate) sensor: Sensor,
+    rectifier: Rectifier,
     pub(crate) volume: Option<SubjectVolume>,
     pub(crate) model: Tsdf,
     pub(crate) noise: f64,
@@ -75,6 +76,7 @@ pub struct Fuser {
     pub(crate) dropped: Vec<DroppedFrame>,
     pub(crate) seen: usize,
     pub(crate) touched: usize,
+    pub(crate) updated: usize,
     pub(crate) clock: Stopwatch,
 }
 
@@ -96,6 +98,7 @@ impl Fuser {
             noise: 0.0,
             window: 2,
             motion: MotionModel::new(settings.prior),
+            rectifier: Rectifier::new(&sensor, settings.max_depth),
             settings,
             sensor,
             volume,
@@ -103,6 +106,7 @@ impl Fuser {
             dropped: Vec::new(),
             seen: 0,
             touched: 0,
+            updated: 0,
             clock: Stopwatch::new(),
         })
     }
@@ -130,6 +134,7 @@ impl Fuser {
         let model = &mut self.model;
         let touched = self.clock.time("integrate", || integrate(model, &view, &scan_from_camera))?;
         self.touched += touched.blocks;
+        self.updated += touched.updated;
         self.motion.push(frame.device_time_ns, scan_from_camera);
         self.kept.push(Kept {
             index: frame.index,
@@ -173,16 +178,17 @@ impl Fuser {
     }
 
     fn prepare(&mut self, frame: &Frame) -> Result<CutDepth, String> {
-        let (sensor, settings) = (&self.sensor, &self.settings);
-        let (camera, depth) = self
+        let (rectifier, settings) = (&self.rectifier, &self.settings);
+        let camera = &rectifier.camera;
+        let depth = self
             .clock
-            .time("filter", || filtered(frame, sensor, settings))
+            .time("filter", || filtered(frame, rectifier, settings))
             .ok_or("no depth image of the sensor's size")?;
-        let depth = match &self.volume {
-            Some(volume) => self.clock.time("cut", || volume.cut(&camera, &depth)),
-            None => depth,
-        };
-        let cut = CutDepth::new(&camera, &depth, self.sensor.depth_scale as f32);
+        let (volume, scale) = (&self.volume, self.sensor.depth_scale as f32);
+        let cut = self.clock.time("cut", || match volume {
+            Some(volume) => CutDepth::new(camera, &volume.cut(camera, &depth), scale),
+            None => CutDepth::new(camera, &depth, scale),
+        });
         if cut.count() < LEAST_PIXELS {
             return Err(format!("only {} pixels of the subject are seen", cut.count()));
         }
@@ -292,12 +298,8 @@ pub(crate) fn first_sensor(rig: &Rig) -> Result<&Sensor, FusionError> {
 }
 
 /// Rectified depth in metres without edges; `None` without depth or with a foreign size.
-pub(crate) fn filtered(frame: &Frame, sensor: &Sensor, settings: &FusionSettings) -> Option<(PinholeCamera, Vec<f32>)> {
-    let image = frame.depth.as_ref()?;
-    if image.width != sensor.depth.width || image.height != sensor.depth.height {
-        return None;
-    }
-    let (camera, depth) = rectified_depth(image, sensor, settings.max_depth);
-    let depth = drop_edges(&camera, &depth, settings.jump_slope);
-    Some((camera, depth))
+pub(crate) fn filtered(frame: &Frame, rectifier: &Rectifier, settings: &FusionSettings) -> Option<Vec<f32>> {
+    let camera = &rectifier.camera;
+    let image = frame.depth.as_ref().filter(|i| (i.width, i.height) == (camera.width, camera.height))?;
+    Some(drop_edges(&rectifier.camera, &rectifier.rectify(image), settings.jump_slope))
 }

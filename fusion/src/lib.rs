@@ -20,6 +20,7 @@ mod finish;
 pub mod floor;
 pub mod fuser;
 pub mod integrate;
+mod lanes;
 pub mod motion;
 pub mod noise;
 pub mod normals;

@@ -9,6 +9,7 @@ use crate::{
     Fuser, FusionError, FusionSettings, Scan, Volume,
     fuser::{filtered, first_sensor},
     report::{DroppedFrame, Stopwatch},
+    view::Rectifier,
     volume::{SURVEY_FRAMES, SubjectVolume, find_volume},
 };
 
@@ -121,13 +122,10 @@ fn read_all(
 /// # Errors
 /// [`FusionError::NobodyInIt`], or a calibration that cannot be used.
 pub fn survey(rig: &Rig, frames: &[Frame], settings: &FusionSettings) -> Result<SubjectVolume, FusionError> {
-    let sensor = first_sensor(rig)?;
+    let rectifier = Rectifier::new(first_sensor(rig)?, settings.max_depth);
     let with_depth: Vec<&Frame> = frames.iter().filter(|f| f.depth.is_some()).collect();
     let step = with_depth.len().div_ceil(SURVEY_FRAMES).max(1);
     let chosen: Vec<&Frame> = with_depth.into_iter().step_by(step).collect();
-    let depths: Vec<Vec<f32>> =
-        chosen.par_iter().filter_map(|f| filtered(f, sensor, settings)).map(|(_, depth)| depth).collect();
-    let mut ideal = sensor.depth;
-    ideal.distortion = [0.0; 5];
-    find_volume(&ideal, &depths)
+    let depths: Vec<Vec<f32>> = chosen.par_iter().filter_map(|f| filtered(f, &rectifier, settings)).collect();
+    find_volume(&rectifier.camera, &depths)
 }

@@ -14,7 +14,7 @@ use crate::{
     test_scene::{Scene, figure_distance, steps},
     track::{register, samples, track},
     tsdf::Tsdf,
-    view::{CutDepth, View, rectified_depth},
+    view::{CutDepth, Rectifier, View},
     volume::find_volume,
 };
 
@@ -26,8 +26,9 @@ fn settings() -> FusionSettings {
 fn view(scene: &Scene, angle: f64, seed: u64) -> View {
     let bare = Scene { with_floor: false, with_wall: false, ..scene.clone() };
     let rig = bare.rig();
-    let (camera, depth) = rectified_depth(&bare.render(Some(angle), seed), &rig.sensors[0], 6.0);
-    CutDepth::new(&camera, &drop_edges(&camera, &depth, 8.3), 0.001).view(2)
+    let rectifier = Rectifier::new(&rig.sensors[0], 6.0);
+    let depth = rectifier.rectify(&bare.render(Some(angle), seed));
+    CutDepth::new(&rectifier.camera, &drop_edges(&rectifier.camera, &depth, 8.3), 0.001).view(2)
 }
 
 fn difference(a: &Rigid, b: &Rigid) -> (f64, f64) {
@@ -71,7 +72,7 @@ fn the_ray_cast_lies_on_the_measured_surface() {
         .filter_map(|i| {
             let hit = seen.hits[i]?;
             let p = camera_from_figure * Point3::from(hit.point).cast::<f64>();
-            Some(p.z - f64::from(view.depth[i]))
+            Some(p.z - f64::from(view.elements[i][0]))
         })
         .collect();
     let count = view.samples(1).count();
@@ -95,8 +96,7 @@ fn a_plane_and_a_sphere_come_out_where_they_are() {
         .map(|i| sphere(crate::view::unproject(&camera, (i % 160) as f32, (i / 160) as f32, 1.0)))
         .collect();
     let filtered = drop_edges(&camera, &depth, 8.3);
-    let normals = crate::normals::normals_from_depth(&camera, &filtered, 2);
-    let view = View { camera, depth: filtered, normals, colors: vec![] };
+    let view = View::new(&camera, &filtered, 2);
     let mut tsdf = Tsdf::new(0.004, 0.016, false);
     integrate(&mut tsdf, &view, &Rigid::identity()).unwrap();
     let mesh = extract_surface(&tsdf, 1);
@@ -262,12 +262,12 @@ fn frames_pushed_one_by_one_report_their_pose() {
 #[test]
 fn the_volume_has_the_axis_the_floor_and_nothing_else() {
     let scene = Scene::new();
-    let rig = scene.rig();
+    let rectifier = Rectifier::new(&scene.rig().sensors[0], 6.0);
     let depths: Vec<Vec<f32>> = steps(20, 18.0)
         .iter()
         .enumerate()
-        .map(|(i, a)| rectified_depth(&scene.render(*a, i as u64), &rig.sensors[0], 6.0))
-        .map(|(camera, depth)| drop_edges(&camera, &depth, 8.3))
+        .map(|(i, a)| rectifier.rectify(&scene.render(*a, i as u64)))
+        .map(|depth| drop_edges(&rectifier.camera, &depth, 8.3))
         .collect();
     let volume = find_volume(&scene.camera, &depths).unwrap();
     let (shift, angle) = difference(&scene.room_from_camera, &volume.scan_from_camera);

@@ -68,14 +68,14 @@ pub(crate) struct Normal {
 
 /// Samples of a view, thinned to about `count`.
 pub fn samples(view: &View, count: usize) -> Vec<Sample> {
-    let all = view.samples(1).count();
+    let all = view.elements.iter().filter(|e| e[0] > 0.0).count();
     let stride = ((all as f64 / count.max(1) as f64).sqrt().round() as usize).max(1);
     view.samples(stride)
-        .map(|i| {
-            let (p, n) = (view.point(i), view.normals[i]);
+        .filter_map(|i| {
+            let (p, n) = view.element(i)?;
             let cosine = -dot(n, p) / dot(p, p).sqrt().max(1e-6);
             let weight = cosine * cosine / (p[2] * p[2]).max(0.25);
-            Sample { point: p.into(), normal: n, weight }
+            Some(Sample { point: p.into(), normal: n, weight })
         })
         .collect()
 }
@@ -83,7 +83,7 @@ pub fn samples(view: &View, count: usize) -> Vec<Sample> {
 /// Registers a view to the model from a predicted pose: coarse, then fine.
 pub fn track(tsdf: &Tsdf, view: &View, predicted: &Rigid) -> Tracked {
     let points = samples(view, FINE_POINTS);
-    let stride = if view.depth.len() > 60_000 { 4 } else { 3 };
+    let stride = if view.elements.len() > 60_000 { 4 } else { 3 };
     let model = ray_cast(tsdf, &view.camera, predicted, stride);
     let coarse = approach(&model, predicted, &points, predicted);
     register(tsdf, &points, &coarse)

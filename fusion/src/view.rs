@@ -5,11 +5,7 @@ use std::sync::Arc;
 use toile_capture::{ColorImage, DepthImage, RgbImage, Sensor};
 use toile_geometry::camera::PinholeCamera;
 
-/// Depth value of a pixel that saw past the volume: the ray is free.
-pub const FREE: f32 = f32::INFINITY;
-
-/// Stored marker of [`FREE`] in a [`CutDepth`].
-const FREE_UNITS: u16 = u16::MAX;
+use crate::normals::{Element, normal_of, surface_elements};
 
 /// Filtered depth of the used part of an image, compact enough to keep a whole take.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,108 +14,121 @@ pub struct CutDepth {
     pub camera: PinholeCamera,
     /// Metres a unit.
     pub scale: f32,
-    /// Row by row; 0 missing, `u16::MAX` free.
+    /// Row by row; 0 missing.
     pub values: Vec<u16>,
 }
 
-/// Depth, normals and weights of the used part of an image.
+/// Surface elements, and colours, of the used part of an image.
 #[derive(Debug, Clone)]
 pub struct View {
     /// Ideal pinhole camera of the part.
     pub camera: PinholeCamera,
-    /// Metres along +Z; 0 missing, [`FREE`] where the ray passes the volume.
-    pub depth: Vec<f32>,
-    /// Unit normals towards the camera, zero where unknown.
-    pub normals: Vec<[f32; 3]>,
+    /// One element a pixel, row by row; those along the border are empty.
+    pub elements: Vec<Element>,
     /// sRGB of each pixel, or empty.
     pub colors: Vec<[u8; 3]>,
 }
 
 impl CutDepth {
-    /// The part of `depth` (metres, [`FREE`] and 0 allowed) that holds measured pixels, with a border of two.
+    /// The part of `depth` (metres, 0 missing) that holds measured pixels, with an unmeasured border, which may lie
+    /// outside the image.
     pub fn new(camera: &PinholeCamera, depth: &[f32], scale: f32) -> Self {
         let (w, h) = (camera.width as usize, camera.height as usize);
         let (mut x0, mut x1, mut y0, mut y1) = (w, 0, h, 0);
-        for (i, &d) in depth.iter().enumerate() {
-            if is_measured(d) {
-                let (x, y) = (i % w, i / w);
-                (x0, x1, y0, y1) = (x0.min(x), x1.max(x), y0.min(y), y1.max(y));
-            }
+        for (y, row) in depth.chunks(w.max(1)).enumerate().filter(|(_, row)| holds_any(row)) {
+            let first = row.iter().position(|d| *d > 0.0).unwrap_or(w);
+            let last = row.iter().rposition(|d| *d > 0.0).unwrap_or(0);
+            (x0, x1, y0, y1) = (x0.min(first), x1.max(last + 1), y0.min(y), y + 1);
         }
-        if x0 > x1 {
+        if x0 >= x1 {
             (x0, x1, y0, y1) = (0, 0, 0, 0);
         }
-        let (x0, y0) = (x0.saturating_sub(2), y0.saturating_sub(2));
-        let (x1, y1) = ((x1 + 2).min(w - 1), (y1 + 2).min(h - 1));
         let mut cut = *camera;
-        (cut.width, cut.height) = ((x1 - x0 + 1) as u32, (y1 - y0 + 1) as u32);
-        (cut.cx, cut.cy) = (camera.cx - x0 as f64, camera.cy - y0 as f64);
-        let unit = |d: f32| match d {
-            FREE => FREE_UNITS,
-            d => (d / scale).round().clamp(0.0, f32::from(FREE_UNITS - 1)) as u16,
-        };
-        let values = (y0..=y1).flat_map(|y| depth[y * w + x0..=y * w + x1].iter().map(|&d| unit(d))).collect();
+        (cut.width, cut.height) = ((x1 - x0 + 2) as u32, (y1 - y0 + 2) as u32);
+        (cut.cx, cut.cy) = (camera.cx - x0 as f64 + 1.0, camera.cy - y0 as f64 + 1.0);
+        let mut values = vec![0; cut.width as usize * cut.height as usize];
+        for (row, y) in values.chunks_mut(x1 - x0 + 2).skip(1).zip(y0..y1) {
+            for (value, d) in row[1..].iter_mut().zip(&depth[y * w + x0..y * w + x1]) {
+                *value = (d / scale + 0.5).min(f32::from(u16::MAX)) as u16;
+            }
+        }
         Self { camera: cut, scale, values }
     }
 
     /// Pixels with a measurement.
     pub fn count(&self) -> usize {
-        self.values.iter().filter(|&&v| v != 0 && v != FREE_UNITS).count()
+        self.values.iter().filter(|v| **v != 0).count()
     }
 
     /// Depth in metres.
     pub fn meters(&self) -> Vec<f32> {
-        self.values.iter().map(|&v| if v == FREE_UNITS { FREE } else { f32::from(v) * self.scale }).collect()
+        self.values.iter().map(|v| f32::from(*v) * self.scale).collect()
     }
 
-    /// Depth with normals (averaged over `window` pixels to each side), without colour.
+    /// Surface elements from normals averaged over `window` pixels to each side, without colour.
     pub fn view(&self, window: usize) -> View {
-        let depth = self.meters();
-        let normals = crate::normals::normals_from_depth(&self.camera, &depth, window);
-        View { camera: self.camera, depth, normals, colors: Vec::new() }
+        View::new(&self.camera, &self.meters(), window)
     }
 }
 
+/// True where any pixel is measured.
+fn holds_any(row: &[f32]) -> bool {
+    row.chunks(64).any(|c| c.iter().fold(0.0, |m, &d| if d > m { d } else { m }) > 0.0)
+}
+
 impl View {
-    /// The point of pixel `i`, camera frame; meaningless where depth is missing.
+    /// The surface elements of a depth image (metres, 0 missing), without colour.
+    pub fn new(camera: &PinholeCamera, depth: &[f32], window: usize) -> Self {
+        Self { camera: *camera, elements: surface_elements(camera, depth, window), colors: Vec::new() }
+    }
+
+    /// The point of pixel `i`, camera frame; meaningless where the element is empty.
     #[inline]
     pub fn point(&self, i: usize) -> [f32; 3] {
         let w = self.camera.width as usize;
-        unproject(&self.camera, (i % w) as f32, (i / w) as f32, self.depth[i])
+        unproject(&self.camera, (i % w) as f32, (i / w) as f32, self.elements[i][0])
     }
 
-    /// Pixels with depth and normal whose column and row are multiples of `stride`.
+    /// Point and unit normal (towards the camera) of pixel `i`, camera frame; `None` where its element is empty.
+    #[inline]
+    pub fn element(&self, i: usize) -> Option<([f32; 3], [f32; 3])> {
+        let w = self.camera.width as usize;
+        let element = &self.elements[i];
+        let [x, y, _] = unproject(&self.camera, (i % w) as f32, (i / w) as f32, 1.0);
+        let z = element[0];
+        (z > 0.0).then(|| ([x * z, y * z, z], normal_of(element, x, y)))
+    }
+
+    /// Pixels with an element whose column and row are multiples of `stride`.
     pub fn samples(&self, stride: usize) -> impl Iterator<Item = usize> + '_ {
         let (w, h) = (self.camera.width as usize, self.camera.height as usize);
         (0..h)
             .step_by(stride)
             .flat_map(move |y| (0..w).step_by(stride).map(move |x| y * w + x))
-            .filter(|&i| is_measured(self.depth[i]) && self.normals[i] != [0.0; 3])
+            .filter(|&i| self.elements[i][0] > 0.0)
     }
 
-    /// Looks up the colour of each measured pixel in a colour image of the same sensor.
+    /// Looks up the colour of each element in a colour image of the same sensor.
     pub fn add_colors(&mut self, image: &RgbImage, sensor: &Sensor) {
         let camera = sensor.color.unwrap_or(sensor.depth);
         let color_from_depth = sensor.color_from_depth;
         let sx = f64::from(image.width) / f64::from(camera.width);
         let sy = f64::from(image.height) / f64::from(camera.height);
-        self.colors = (0..self.depth.len())
-            .map(|i| {
-                if !is_measured(self.depth[i]) {
-                    return [0; 3];
-                }
-                let [x, y, z] = self.point(i);
-                let p = color_from_depth * nalgebra::Point3::new(f64::from(x), f64::from(y), f64::from(z));
-                camera.project(&p).map_or([0; 3], |q| bilinear(image, (q.x * sx) as f32, (q.y * sy) as f32))
-            })
-            .collect();
+        let color = |i: usize| {
+            if self.elements[i][0] <= 0.0 {
+                return [0; 3];
+            }
+            let p = color_from_depth * nalgebra::Point3::from(self.point(i)).cast::<f64>();
+            camera.project(&p).map_or([0; 3], |q| bilinear(image, (q.x * sx) as f32, (q.y * sy) as f32))
+        };
+        self.colors = (0..self.elements.len()).map(color).collect();
     }
 }
 
-/// True for a depth that was measured (neither missing nor free).
+/// True for a depth that was measured.
 #[inline]
 pub fn is_measured(depth: f32) -> bool {
-    depth > 0.0 && depth < FREE
+    depth > 0.0
 }
 
 /// The point seen at pixel (u, v) of an ideal camera.
@@ -133,28 +142,45 @@ pub fn decode_color(color: Option<&ColorImage>, index: u64) -> Option<Arc<RgbIma
     color.and_then(|c| c.decode(index).ok())
 }
 
-/// Depth in metres as an ideal camera of the same focal lengths sees it (nearest pixel); 0 where missing or beyond
-/// `max_depth`.
-pub fn rectified_depth(image: &DepthImage, sensor: &Sensor, max_depth: f64) -> (PinholeCamera, Vec<f32>) {
-    let scale = sensor.depth_scale as f32;
-    let limit = max_depth as f32;
-    let meters = |v: u16| {
-        let d = f32::from(v) * scale;
-        if v == u16::MAX || d > limit { 0.0 } else { d }
-    };
-    let mut ideal = sensor.depth;
-    if !sensor.depth.is_distorted() {
-        return (ideal, image.values.iter().map(|&v| meters(v)).collect());
+/// Brings depth images of one sensor to metres as an ideal camera of the same focal lengths sees them.
+#[derive(Debug, Clone)]
+pub struct Rectifier {
+    /// The ideal camera.
+    pub camera: PinholeCamera,
+    scale: f32,
+    max_depth: f32,
+    /// Source pixel of each pixel (`u32::MAX`: none); empty where the lens is ideal already.
+    map: Vec<u32>,
+}
+
+impl Rectifier {
+    /// For a sensor; depth beyond `max_depth` metres counts as missing.
+    pub fn new(sensor: &Sensor, max_depth: f64) -> Self {
+        let mut camera = sensor.depth;
+        camera.distortion = [0.0; 5];
+        let source = |ray: &[f32; 2]| {
+            let q = sensor.depth.project(&nalgebra::Point3::new(f64::from(ray[0]), f64::from(ray[1]), 1.0))?;
+            let (u, v) = (q.x.round(), q.y.round());
+            let inside = u >= 0.0 && v >= 0.0 && u < f64::from(camera.width) && v < f64::from(camera.height);
+            inside.then(|| v as u32 * camera.width + u as u32)
+        };
+        let distorted = sensor.depth.is_distorted();
+        let map =
+            if distorted { camera.rays().iter().map(|r| source(r).unwrap_or(u32::MAX)).collect() } else { vec![] };
+        Self { camera, scale: sensor.depth_scale as f32, max_depth: max_depth as f32, map }
     }
-    ideal.distortion = [0.0; 5];
-    let ideal_rays = ideal.rays();
-    let at = |ray: &[f32; 2]| {
-        let p = nalgebra::Point3::new(f64::from(ray[0]), f64::from(ray[1]), 1.0);
-        let q = sensor.depth.project(&p)?;
-        let (u, v) = (q.x.round(), q.y.round());
-        (u >= 0.0 && v >= 0.0).then(|| meters(image.at(u as u32, v as u32)))
-    };
-    (ideal, ideal_rays.iter().map(|r| at(r).unwrap_or(0.0)).collect())
+
+    /// Depth in metres (nearest pixel); 0 where missing, saturated or too far.
+    pub fn rectify(&self, image: &DepthImage) -> Vec<f32> {
+        let meters = |v: u16| {
+            let d = f32::from(v) * self.scale;
+            if v == u16::MAX || d > self.max_depth { 0.0 } else { d }
+        };
+        if self.map.is_empty() {
+            return image.values.iter().map(|v| meters(*v)).collect();
+        }
+        self.map.iter().map(|&i| image.values.get(i as usize).map_or(0.0, |v| meters(*v))).collect()
+    }
 }
 
 fn bilinear(image: &RgbImage, x: f32, y: f32) -> [u8; 3] {

@@ -10,7 +10,8 @@ use toile_geometry::{Rigid, camera::PinholeCamera};
 use crate::{
     FusionError,
     floor::{Floor, find_floor},
-    view::{FREE, is_measured, unproject},
+    lanes::{Kernel, LANES, Lanes, dispatch, group, put_group},
+    view::{is_measured, unproject},
 };
 
 /// Most frames that are looked at.
@@ -202,25 +203,53 @@ fn percentile(ascending: &[f64], q: f64) -> f64 {
 }
 
 impl SubjectVolume {
-    /// Depth with everything outside the volume taken away: [`FREE`] where the ray passed through it, else 0.
+    /// Depth with everything outside the volume taken away.
     pub fn cut(&self, camera: &PinholeCamera, depth: &[f32]) -> Vec<f32> {
-        let w = camera.width as usize;
-        let t = self.scan_from_camera;
-        let eye = Point3::from(t.translation.vector);
-        let axis_range = eye.x.hypot(eye.z) - self.radius;
-        let inside = |i: usize, d: f32| {
-            if !is_measured(d) {
-                return 0.0;
-            }
-            let [x, y, z] = unproject(camera, (i % w) as f32, (i / w) as f32, d);
-            let p = t * Point3::new(f64::from(x), f64::from(y), f64::from(z));
-            let above = self.bottom.is_none_or(|b| p.y > b);
-            if above && p.x.hypot(p.z) < self.radius {
-                return d;
-            }
-            let passed = !above || (p.x - eye.x).hypot(p.z - eye.z) > axis_range;
-            if passed { FREE } else { 0.0 }
-        };
-        depth.iter().enumerate().map(|(i, &d)| inside(i, d)).collect()
+        dispatch(Cut { volume: self, camera, depth })
     }
+}
+
+struct Cut<'a> {
+    volume: &'a SubjectVolume,
+    camera: &'a PinholeCamera,
+    depth: &'a [f32],
+}
+
+impl Kernel for Cut<'_> {
+    type Output = Vec<f32>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> Vec<f32> {
+        let (camera, width) = (self.camera, self.camera.width as usize);
+        let rotation = self.volume.scan_from_camera.rotation.to_rotation_matrix();
+        let turn: [[f32; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)] as f32));
+        let shift: [f32; 3] = self.volume.scan_from_camera.translation.vector.cast::<f32>().into();
+        let bottom = l.splat(self.volume.bottom.map_or(f32::NEG_INFINITY, |b| b as f32));
+        let reach = l.splat((self.volume.radius * self.volume.radius) as f32);
+        let rays: Vec<f32> = (0..width).map(|u| unproject(camera, u as f32, 0.0, 1.0)[0]).collect();
+        let mut cut = vec![0.0; self.depth.len()];
+        for (v, (row, out)) in self.depth.chunks(width.max(1)).zip(cut.chunks_mut(width.max(1))).enumerate() {
+            let y = unproject(camera, 0.0, v as f32, 1.0)[1];
+            for x in (0..width).step_by(LANES) {
+                let d = l.load(&group(row, x));
+                if !l.any(l.gt(d, l.splat(0.0))) {
+                    continue;
+                }
+                let ray = l.load(&group(&rays, x));
+                let px = coordinate(l, turn[0], shift[0], ray, y, d);
+                let py = coordinate(l, turn[1], shift[1], ray, y, d);
+                let pz = coordinate(l, turn[2], shift[2], ray, y, d);
+                let within = l.gt(reach, l.add(l.mul(px, px), l.mul(pz, pz)));
+                put_group(out, x, l.store(l.keep(l.and(within, l.gt(py, bottom)), d)));
+            }
+        }
+        cut
+    }
+}
+
+/// One coordinate of the points at depths along rays, from its row of a transform.
+#[inline(always)]
+fn coordinate<L: Lanes>(l: L, turn: [f32; 3], shift: f32, ray: L::F, y: f32, depth: L::F) -> L::F {
+    let across = l.add(l.mul(ray, l.splat(turn[0])), l.splat(turn[1] * y + turn[2]));
+    l.add(l.mul(across, depth), l.splat(shift))
 }

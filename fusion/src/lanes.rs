@@ -1,0 +1,143 @@
+//! Sixteen floats at a time: AVX-512 or AVX2 where the machine has them, plain arrays elsewhere, chosen at run time.
+//!
+//! A kernel is written once over [`Lanes`]. Every kind rounds after each operation and never fuses a multiplication
+//! with an addition, so results are the same to the last bit and a scan does not depend on the machine.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod scalar;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use scalar::Scalar;
+
+/// Number of lanes.
+pub(crate) const LANES: usize = 16;
+
+/// Adding 1.5 · 2²³ puts a float's rounded value into its low bits; subtracting it again rounds to nearest even.
+const ROUNDER: f32 = 12_582_912.0;
+
+/// Operations on sixteen floats.
+#[allow(clippy::wrong_self_convention)]
+pub(crate) trait Lanes: Copy + Send + Sync {
+    /// Sixteen floats.
+    type F: Copy;
+    /// Sixteen truths.
+    type M: Copy;
+
+    fn load(self, values: &[f32; LANES]) -> Self::F;
+    fn store(self, a: Self::F) -> [f32; LANES];
+    fn splat(self, value: f32) -> Self::F;
+    fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    fn sqrt(self, a: Self::F) -> Self::F;
+    /// `a` where it is less than `b`, else `b`.
+    fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    /// `a` where it is greater than `b`, else `b`.
+    fn max(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a ≥ b; false of NaN.
+    fn ge(self, a: Self::F, b: Self::F) -> Self::M;
+    /// a > b; false of NaN.
+    fn gt(self, a: Self::F, b: Self::F) -> Self::M;
+    fn and(self, a: Self::M, b: Self::M) -> Self::M;
+    fn or(self, a: Self::M, b: Self::M) -> Self::M;
+    fn any(self, a: Self::M) -> bool;
+    /// `a` where the mask is set, else `b`.
+    fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F;
+    /// The integers that whole floats from 0 to 2²⁴ stand for.
+    fn indices(self, a: Self::F) -> [u32; LANES];
+    /// Component k of all records as the k-th result.
+    fn transpose(self, records: [&[f32; 4]; LANES]) -> [Self::F; 4];
+    fn from_i16(self, values: &[i16; LANES]) -> Self::F;
+    fn from_u16(self, values: &[u16; LANES]) -> Self::F;
+    /// Rounded to nearest even and saturated; the values must lie within ±2²².
+    fn to_i16(self, a: Self::F) -> [i16; LANES];
+    /// Rounded to nearest even and saturated; the values must lie within ±2²².
+    fn to_u16(self, a: Self::F) -> [u16; LANES];
+
+    /// Rounded to nearest even, for values within ±2²².
+    #[inline(always)]
+    fn round(self, a: Self::F) -> Self::F {
+        let rounder = self.splat(ROUNDER);
+        self.sub(self.add(a, rounder), rounder)
+    }
+
+    /// Absolute value.
+    #[inline(always)]
+    fn abs(self, a: Self::F) -> Self::F {
+        self.max(a, self.sub(self.splat(0.0), a))
+    }
+
+    /// `a` where the mask is set, else 0.
+    #[inline(always)]
+    fn keep(self, mask: Self::M, a: Self::F) -> Self::F {
+        self.select(mask, a, self.splat(0.0))
+    }
+}
+
+/// A computation that is compiled for every kind of lanes. Lane operations inside closures that are handed on (to
+/// `map`, `from_fn`) stay calls of functions: write them out.
+pub(crate) trait Kernel {
+    /// Its result.
+    type Output;
+
+    /// Computes; must be `#[inline(always)]`, with all that it calls per lane.
+    fn run<L: Lanes>(self, lanes: L) -> Self::Output;
+}
+
+/// The values from `at` on, 0 beyond the end of the row.
+#[inline(always)]
+pub(crate) fn group<T: Copy + Default>(row: &[T], at: usize) -> [T; LANES] {
+    match row.get(at..).and_then(|r| r.first_chunk()) {
+        Some(whole) => *whole,
+        None => std::array::from_fn(|k| row.get(at + k).copied().unwrap_or_default()),
+    }
+}
+
+/// Writes values from `at` on as far as the row goes.
+#[inline(always)]
+pub(crate) fn put_group<T: Copy>(row: &mut [T], at: usize, values: [T; LANES]) {
+    let end = row.len().min(at + LANES);
+    row[at..end].copy_from_slice(&values[..end - at]);
+}
+
+/// Runs a kernel on the best lanes that this machine has.
+#[inline]
+pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    match pulp::x86::Arch::new() {
+        pulp::x86::Arch::V4(simd) => return pulp::Simd::vectorize(simd, Using(avx512::Avx512(simd), kernel)),
+        pulp::x86::Arch::V3(simd) => return pulp::Simd::vectorize(simd, Using(avx2::Avx2(simd), kernel)),
+        _ => {}
+    }
+    kernel.run(Scalar)
+}
+
+/// Name of the instruction set that kernels use on this machine.
+pub(crate) fn instruction_set() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    match pulp::x86::Arch::new() {
+        pulp::x86::Arch::V4(_) => return "avx512",
+        pulp::x86::Arch::V3(_) => return "avx2",
+        _ => {}
+    }
+    "scalar"
+}
+
+/// A kernel with the lanes it shall run on, inside a function compiled for them.
+#[cfg(target_arch = "x86_64")]
+struct Using<L, K>(L, K);
+
+#[cfg(target_arch = "x86_64")]
+impl<L: Lanes, K: Kernel> pulp::WithSimd for Using<L, K> {
+    type Output = K::Output;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> K::Output {
+        self.1.run(self.0)
+    }
+}
