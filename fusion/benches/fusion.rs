@@ -88,8 +88,7 @@ impl Material {
         let view = |frame: &Frame| {
             let rectifier = Rectifier::new(&figure.rig().sensors[0], 6.0);
             let depth = rectifier.rectify(frame.depth.as_ref().unwrap());
-            let mut view =
-                CutDepth::new(&rectifier.camera, &drop_edges(&rectifier.camera, &depth, 8.3), 0.001).view(2);
+            let mut view = CutDepth::new(&rectifier.camera, &drop_edges(&rectifier.camera, &depth, 8.3), 0.001).view(2);
             view.colors = view.elements.iter().map(|[_, n @ ..]| n.map(|c| (128.0 + 100.0 * c) as u8)).collect();
             view
         };

@@ -125,13 +125,13 @@ fn match_pixel(view: &View, p: &Point3<f32>, normal: [f32; 3], gate: f32) -> Opt
         return None;
     }
     let camera = &view.camera;
-    let u = camera.fx as f32 * p.x / p.z + camera.cx as f32 + 0.5;
-    let v = camera.fy as f32 * p.y / p.z + camera.cy as f32 + 0.5;
+    let inverse = 1.0 / p.z;
+    let u = camera.fx as f32 * p.x * inverse + camera.cx as f32 + 0.5;
+    let v = camera.fy as f32 * p.y * inverse + camera.cy as f32 + 0.5;
     if u < 0.0 || v < 0.0 || u >= camera.width as f32 || v >= camera.height as f32 {
         return None;
     }
-    let i = v as usize * camera.width as usize + u as usize;
-    let (q, n) = view.element(i).filter(|(_, n)| dot(*n, normal) >= 0.7)?;
+    let (q, n) = view.element_at(u as usize, v as usize).filter(|(_, n)| dot(*n, normal) >= 0.7)?;
     let d = [p.x - q[0], p.y - q[1], p.z - q[2]];
     let r = dot(n, d);
     let cosine = -dot(n, q) / dot(q, q).sqrt();

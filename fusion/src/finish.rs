@@ -22,7 +22,11 @@ use crate::{
 /// A turn of this many degrees is a full one.
 const FULL_TURN_DEG: f64 = 340.0;
 /// Most frames in the joint optimisation; of more, evenly spaced ones.
-const MOST_KEY_FRAMES: usize = 150;
+const MOST_CLOSED: usize = 100;
+/// Most frames in a round of refinement.
+const MOST_REFINED: usize = 200;
+/// Most frames whose colours are used.
+const MOST_COLORED: usize = 200;
 /// Frames in which a voxel must have been seen well, in weight units, to be surface.
 const LEAST_WEIGHT: u16 = 6;
 
@@ -54,9 +58,7 @@ impl Fuser {
                 progress(0.3 + 0.2 * (round + 1) as f32 / self.settings.refine_rounds as f32);
             }
         }
-        // At fine voxels memory decides: what is not needed any more goes before the next large thing comes.
-        self.model = self.empty_field(false);
-        let field = self.fuse_again(true)?;
+        let field = self.final_field()?;
         progress(0.7);
         let raw = self.clock.time("extract", || extract_surface(&field, LEAST_WEIGHT));
         report.triangles_raw = raw.triangles.len();
@@ -83,8 +85,7 @@ impl Fuser {
         if self.settings.closing_rounds == 0 {
             return;
         }
-        let step = self.kept.len().div_ceil(MOST_KEY_FRAMES).max(1);
-        let keys: Vec<usize> = (0..self.kept.len()).step_by(step).collect();
+        let keys = self.key_frames(MOST_CLOSED);
         let views = self.views(&keys);
         let mut poses: Vec<Rigid> = keys.iter().map(|&i| self.kept[i].scan_from_camera).collect();
         let rounds = self.settings.closing_rounds;
@@ -93,8 +94,35 @@ impl Fuser {
         report.seam_pairs = closing.seam_pairs;
         report.seam_before_mm = closing.seam_before * 1e3;
         report.seam_after_mm = closing.seam_after * 1e3;
+        self.follow(&keys, &poses);
+    }
+
+    /// Fuses key frames and registers each of them to the whole.
+    fn refine(&mut self) -> Result<(), FusionError> {
+        let keys = self.key_frames(MOST_REFINED);
+        let field = self.fuse_again(&keys, false)?;
+        let (kept, window) = (&self.kept, self.window);
+        let registered = |&i: &usize| {
+            let (view, before) = (kept[i].depth.view(window), kept[i].scan_from_camera);
+            let tracked = register(&field, &samples(&view, 6000), &before);
+            if tracked.overlap > 0.5 { tracked.scan_from_camera } else { before }
+        };
+        let poses: Vec<Rigid> = self.clock.time("refine", || keys.par_iter().map(registered).collect());
+        let back = self.kept[0].scan_from_camera * poses[0].inverse();
+        self.follow(&keys, &poses.iter().map(|pose| back * pose).collect::<Vec<_>>());
+        Ok(())
+    }
+
+    /// At most so many frames, evenly spaced from the first on.
+    fn key_frames(&self, most: usize) -> Vec<usize> {
+        (0..self.kept.len()).step_by(self.kept.len().div_ceil(most).max(1)).collect()
+    }
+
+    /// Gives the key frames new poses; the frames between follow their neighbours smoothly.
+    fn follow(&mut self, keys: &[usize], poses: &[Rigid]) {
+        let step = keys.get(1).map_or(1, |second| second - keys[0]);
         let corrections: Vec<Rigid> =
-            keys.iter().zip(&poses).map(|(&i, pose)| pose * self.kept[i].scan_from_camera.inverse()).collect();
+            keys.iter().zip(poses).map(|(&i, pose)| pose * self.kept[i].scan_from_camera.inverse()).collect();
         for (i, kept) in self.kept.iter_mut().enumerate() {
             let (k, share) = (i / step, (i % step) as f64 / step as f64);
             let next = corrections.get(k + 1).unwrap_or(&corrections[k]);
@@ -102,35 +130,32 @@ impl Fuser {
         }
     }
 
-    /// Fuses all frames and registers each of them to the whole.
-    fn refine(&mut self) -> Result<(), FusionError> {
-        let field = self.fuse_again(false)?;
-        let (kept, window) = (&self.kept, self.window);
-        let poses: Vec<Rigid> = self.clock.time("refine", || {
-            kept.par_iter()
-                .map(|k| {
-                    let view = k.depth.view(window);
-                    let tracked = register(&field, &samples(&view, 6000), &k.scan_from_camera);
-                    if tracked.overlap > 0.5 { tracked.scan_from_camera } else { k.scan_from_camera }
-                })
-                .collect()
-        });
-        let back = self.kept[0].scan_from_camera * poses[0].inverse();
-        self.kept.iter_mut().zip(poses).for_each(|(k, pose)| k.scan_from_camera = back * pose);
-        Ok(())
+    /// The field of the scan: of all frames, with the colours of key frames. Where poses are as they were pushed and
+    /// there are no colours, that is the model already.
+    fn final_field(&mut self) -> Result<Tsdf, FusionError> {
+        let as_pushed =
+            self.settings.poses.is_some() || (self.settings.closing_rounds == 0 && self.settings.refine_rounds == 0);
+        if as_pushed && self.kept.iter().all(|k| k.color.is_none()) {
+            let nothing = self.empty_field(false);
+            return Ok(std::mem::replace(&mut self.model, nothing));
+        }
+        // At fine voxels memory decides: what is not needed any more goes before the next large thing comes.
+        self.model = self.empty_field(false);
+        self.fuse_again(&(0..self.kept.len()).collect::<Vec<_>>(), true)
     }
 
-    fn fuse_again(&mut self, with_color: bool) -> Result<Tsdf, FusionError> {
+    fn fuse_again(&mut self, frames: &[usize], with_color: bool) -> Result<Tsdf, FusionError> {
         let with_color = with_color && self.kept.iter().any(|k| k.color.is_some());
         let mut field = self.empty_field(with_color);
         let window = self.window;
+        let colored = self.kept.len().div_ceil(MOST_COLORED).max(1);
         let (kept, sensor, clock) = (&self.kept, &self.sensor, &mut self.clock);
         let step = if with_color { "integrate with colour" } else { "integrate again" };
-        for group in kept.chunks(16) {
-            let prepare = || group.par_iter().map(|k| colored_view(k, sensor, window, with_color)).collect();
-            let views: Vec<View> = clock.time("prepare again", prepare);
-            for (k, view) in group.iter().zip(&views) {
-                clock.time(step, || integrate(&mut field, view, &k.scan_from_camera))?;
+        for group in frames.chunks(16) {
+            let view = |&i: &usize| colored_view(&kept[i], sensor, window, with_color && i.is_multiple_of(colored));
+            let views: Vec<View> = clock.time("prepare again", || group.par_iter().map(view).collect());
+            for (&i, view) in group.iter().zip(&views) {
+                clock.time(step, || integrate(&mut field, view, &kept[i].scan_from_camera))?;
             }
         }
         Ok(field)
@@ -188,6 +213,8 @@ impl Fuser {
         timings.blocks = field.blocks;
         timings.voxels = field.blocks * crate::tsdf::VOXELS;
         timings.voxels_touched_per_frame = self.touched * crate::tsdf::VOXELS / self.kept.len().max(1);
+        timings.voxels_updated_per_frame = self.updated / self.kept.len().max(1);
+        timings.simd = crate::lanes::instruction_set().into();
         timings.field_bytes = field.bytes;
         let trajectory = self
             .kept

@@ -17,8 +17,16 @@ use crate::{
 const CHUNK: usize = 512;
 /// About how many points the fine stage uses.
 const FINE_POINTS: usize = 4000;
+/// Least overlap and inliers at which a registration without the coarse stage is believed.
+const NEAR: (f64, f64) = (0.8, 0.7);
+/// One point in so many serves until the pose hardly moves.
+const THINNING: usize = 6;
+/// A step below this (metres at the subject's radius) asks for all points.
+const NEARLY: f64 = 2e-4;
 /// Distance gates of the coarse iterations, metres.
 const COARSE_GATES: [f64; 7] = [0.10, 0.08, 0.06, 0.05, 0.04, 0.03, 0.03];
+/// Fewer points than this say nothing.
+const LEAST_POINTS: usize = 50;
 /// Most fine iterations.
 const FINE_ITERATIONS: usize = 15;
 /// A step below this (metres at the subject's radius) has converged.
@@ -80,9 +88,14 @@ pub fn samples(view: &View, count: usize) -> Vec<Sample> {
         .collect()
 }
 
-/// Registers a view to the model from a predicted pose: coarse, then fine.
+/// Registers a view to the model from a predicted pose: against the distance field at once where that pose lies well
+/// within its band, else the coarse stage goes before.
 pub fn track(tsdf: &Tsdf, view: &View, predicted: &Rigid) -> Tracked {
     let points = samples(view, FINE_POINTS);
+    let near = register(tsdf, &points, predicted);
+    if near.converged && near.overlap > NEAR.0 && near.inliers > NEAR.1 {
+        return near;
+    }
     let stride = if view.elements.len() > 60_000 { 4 } else { 3 };
     let model = ray_cast(tsdf, &view.camera, predicted, stride);
     let coarse = approach(&model, predicted, &points, predicted);
@@ -103,7 +116,7 @@ pub fn approach(model: &ModelView, rendered_at: &Rigid, points: &[Sample], start
             let kernel = (1.0 - (r / gate) * (r / gate)).max(0.0);
             Some((r, hit.normal, kernel * kernel))
         });
-        if system.count < 50 {
+        if system.count < LEAST_POINTS {
             break;
         }
         pose = step(&system, &center, 1e-4).0 * pose;
@@ -130,8 +143,18 @@ fn associate(
     (f64::from(dot(d, d)) < gate * gate && dot(hit.normal, normal) > 0.6).then_some(hit)
 }
 
-/// Fine stage: the samples against the distance field, Tukey's kernel with a scale taken from the data.
+/// Fine stage: the samples against the distance field, Tukey's kernel with a scale taken from the data; a few of them
+/// until the pose hardly moves, then all.
 pub fn register(tsdf: &Tsdf, points: &[Sample], start: &Rigid) -> Tracked {
+    let few: Vec<Sample> = points.iter().step_by(THINNING).copied().collect();
+    let rough = descend(tsdf, &few, start, NEARLY);
+    let start = if rough.iterations < FINE_ITERATIONS { rough.scan_from_camera } else { *start };
+    let fine = descend(tsdf, points, &start, CONVERGED);
+    Tracked { iterations: rough.iterations + fine.iterations, ..assess(tsdf, points, fine) }
+}
+
+/// Gauss–Newton steps until one is smaller than `enough`.
+fn descend(tsdf: &Tsdf, points: &[Sample], start: &Rigid, enough: f64) -> Tracked {
     let mut pose = *start;
     let truncation = f64::from(tsdf.truncation());
     let mut result = Tracked {
@@ -145,7 +168,7 @@ pub fn register(tsdf: &Tsdf, points: &[Sample], start: &Rigid) -> Tracked {
     };
     let mut cut = truncation * 0.9;
     for iteration in 0..FINE_ITERATIONS {
-        if iteration < 4 {
+        if iteration < 3 {
             let spread = robust_spread(tsdf, points, &pose).unwrap_or(truncation / 3.0);
             cut = (4.7 * spread).clamp(0.002, truncation * 0.9);
         }
@@ -156,18 +179,18 @@ pub fn register(tsdf: &Tsdf, points: &[Sample], start: &Rigid) -> Tracked {
             Some((r, normal, k * k))
         });
         result.iterations = iteration + 1;
-        if system.count < 50 {
+        if system.count < LEAST_POINTS {
             return result;
         }
         let (motion, size) = step(&system, &center, 1e-6);
         pose = motion * pose;
-        result.conditioning = conditioning(&system);
-        result.converged = size < CONVERGED;
+        (result.scan_from_camera, result.conditioning) = (pose, conditioning(&system));
+        result.converged = size < enough;
         if result.converged {
             break;
         }
     }
-    assess(tsdf, points, pose, result)
+    result
 }
 
 /// Distance to the surface and its normal, where the point's own normal agrees with it.
@@ -184,12 +207,13 @@ fn signed_distance(tsdf: &Tsdf, q: &Point3<f32>, normal: [f32; 3]) -> Option<(f6
 
 /// Robust standard deviation of the distances (1.4826 × median absolute value); `None` of fewer than 50.
 fn robust_spread(tsdf: &Tsdf, points: &[Sample], pose: &Rigid) -> Option<f64> {
-    let mut all: Vec<f64> = distances(tsdf, &points.iter().step_by(4).copied().collect::<Vec<_>>(), pose)
-        .into_iter()
-        .flatten()
-        .map(f64::abs)
-        .collect();
-    if all.len() < 50 {
+    let mut all: Vec<f64> =
+        distances(tsdf, &points.iter().step_by(points.len() / 1000 + 1).copied().collect::<Vec<_>>(), pose)
+            .into_iter()
+            .flatten()
+            .map(f64::abs)
+            .collect();
+    if all.len() < LEAST_POINTS {
         return None;
     }
     let middle = all.len() / 2;
@@ -211,8 +235,9 @@ fn distances(tsdf: &Tsdf, points: &[Sample], pose: &Rigid) -> Vec<Option<f64>> {
         .collect()
 }
 
-fn assess(tsdf: &Tsdf, points: &[Sample], pose: Rigid, result: Tracked) -> Tracked {
-    let all = distances(tsdf, points, &pose);
+/// How well the points fit at the pose found.
+fn assess(tsdf: &Tsdf, points: &[Sample], result: Tracked) -> Tracked {
+    let all = distances(tsdf, points, &result.scan_from_camera);
     let within: Vec<f64> = all.iter().flatten().copied().collect();
     let mut sizes: Vec<f64> = within.iter().map(|d| d.abs()).collect();
     sizes.sort_unstable_by(f64::total_cmp);
@@ -221,7 +246,6 @@ fn assess(tsdf: &Tsdf, points: &[Sample], pose: Rigid, result: Tracked) -> Track
     let inliers: Vec<f64> = within.iter().copied().filter(|d| d.abs() <= limit).collect();
     let mean_square = inliers.iter().map(|d| d * d).sum::<f64>() / inliers.len().max(1) as f64;
     Tracked {
-        scan_from_camera: pose,
         overlap: within.len() as f64 / points.len().max(1) as f64,
         inliers: inliers.len() as f64 / within.len().max(1) as f64,
         residual: mean_square.sqrt(),

@@ -93,10 +93,19 @@ impl View {
     #[inline]
     pub fn element(&self, i: usize) -> Option<([f32; 3], [f32; 3])> {
         let w = self.camera.width as usize;
-        let element = &self.elements[i];
-        let [x, y, _] = unproject(&self.camera, (i % w) as f32, (i / w) as f32, 1.0);
+        self.element_at(i % w, i / w)
+    }
+
+    /// The same of the pixel at a column and a row of the image.
+    #[inline]
+    pub fn element_at(&self, u: usize, v: usize) -> Option<([f32; 3], [f32; 3])> {
+        let element = &self.elements[v * self.camera.width as usize + u];
         let z = element[0];
-        (z > 0.0).then(|| ([x * z, y * z, z], normal_of(element, x, y)))
+        if z <= 0.0 {
+            return None;
+        }
+        let [x, y, _] = unproject(&self.camera, u as f32, v as f32, 1.0);
+        Some(([x * z, y * z, z], normal_of(element, x, y)))
     }
 
     /// Pixels with an element whose column and row are multiples of `stride`.
