@@ -29,6 +29,8 @@ const TRUST: (f64, f64, f64) = (0.4, 0.5, 0.4);
 const DEPARTURE: (f64, f64) = (0.06, 0.12);
 /// First guesses of the turn between the first two frames, degrees.
 const FIRST_TURNS: [f64; 11] = [0.0, 1.5, -1.5, 3.5, -3.5, 6.0, -6.0, 9.0, -9.0, 13.0, -13.0];
+/// A residual of so many standard deviations of the frame's own noise is trusted too: far rooms are noisy.
+const NOISE_RESIDUAL: f64 = 2.5;
 /// The band is at least this many standard deviations of the noise.
 const NOISE_BAND: f64 = 4.5;
 
@@ -214,7 +216,7 @@ impl Fuser {
         } else {
             self.clock.time("first turn", || best_of(model, view, &turned_guesses(&predicted, &FIRST_TURNS)))
         };
-        if let Err(reason) = self.trusted(&tracked, &predicted) {
+        if let Err(reason) = self.trusted(view, &tracked, &predicted) {
             return self.relocalise(view, &predicted, reason);
         }
         Ok((tracked.scan_from_camera, Some(tracked)))
@@ -235,13 +237,17 @@ impl Fuser {
         let model = &self.model;
         let tracked = self.clock.time("relocalise", || best_of(model, view, &guesses));
         let near = if self.settings.prior == Prior::Turntable { *predicted } else { tracked.scan_from_camera };
-        self.trusted(&tracked, &near).map_err(|_| reason)?;
+        self.trusted(view, &tracked, &near).map_err(|_| reason)?;
         Ok((tracked.scan_from_camera, Some(tracked)))
     }
 
-    fn trusted(&self, tracked: &Tracked, predicted: &Rigid) -> Result<(), String> {
+    fn trusted(&self, view: &View, tracked: &Tracked, predicted: &Rigid) -> Result<(), String> {
         let (overlap, inliers, residual) = TRUST;
-        let limit = residual * f64::from(self.model.truncation());
+        let mut limit = residual * f64::from(self.model.truncation());
+        if tracked.residual > limit {
+            let depth: Vec<f32> = view.elements.iter().map(|e| e[0]).collect();
+            limit = limit.max(NOISE_RESIDUAL * depth_noise(&view.camera, &depth).unwrap_or(0.0));
+        }
         if tracked.overlap < overlap {
             return Err(format!("lost: {:.0} % of its points lie on the model", tracked.overlap * 100.0));
         }
