@@ -26,7 +26,7 @@ const COLOR: f64 = 0.05;
 /// A triangle may not turn by more than this (cosine) in one collapse.
 const TURN: f64 = 0.3;
 /// Share of the edges that a round looks at.
-const SHARE: f64 = 0.25;
+const SHARE: f64 = 0.5;
 
 struct Collapser {
     positions: Vec<Point3<f64>>,
