@@ -114,10 +114,8 @@ fn band_pixels(view: &View, stride: usize) -> impl Iterator<Item = usize> + '_ {
         (first..width.saturating_sub(1)).step_by(step).map(move |x| (x, y * width + x, on_row)).filter_map(
             move |(x, i, on_row)| {
                 let on_column = x % stride == 0;
-                let wanted = has(i)
-                    && ((on_row && on_column)
-                        || (on_row && !(has(i - 1) && has(i + 1)))
-                        || (on_column && !(has(i - width) && has(i + width))));
+                let ends = |step: usize| !(has(i - step) && has(i + step));
+                let wanted = has(i) && ((on_row && (on_column || ends(1))) || (on_column && ends(width)));
                 wanted.then_some(i)
             },
         )
