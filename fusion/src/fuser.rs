@@ -21,6 +21,8 @@ use crate::{
     volume::SubjectVolume,
 };
 
+/// Most pixels of a depth image: their numbers, with the border that a view adds, must be exact as floats.
+const MOST_PIXELS: u64 = 16_000_000;
 /// Least measured pixels of a frame that is used.
 const LEAST_PIXELS: usize = 500;
 /// Least overlap, inliers and largest residual (share of the truncation) of a trusted pose.
@@ -299,6 +301,9 @@ pub(crate) fn first_sensor(rig: &Rig) -> Result<&Sensor, FusionError> {
     let sensor = rig.sensors.first().ok_or_else(|| wrong("the source names no sensor"))?;
     if !sensor.depth.is_valid() || sensor.depth_scale.is_nan() || sensor.depth_scale <= 0.0 {
         return Err(wrong("image size, focal length or depth scale is not positive"));
+    }
+    if u64::from(sensor.depth.width) * u64::from(sensor.depth.height) > MOST_PIXELS {
+        return Err(wrong("its depth image has more than 16 million pixels; record at a smaller size"));
     }
     Ok(sensor)
 }

@@ -239,6 +239,9 @@ fn settings_out_of_range_and_missing_depth_are_refused() {
     let bad = FusionSettings { truncation: 0.004, ..settings() };
     let error = fuse(&mut scene.source(&steps(12, 30.0)), &bad, &|_| {}).unwrap_err();
     assert!(matches!(error, FusionError::Settings(_)), "{error}");
+    let mut huge = scene.rig();
+    (huge.sensors[0].depth.width, huge.sensors[0].depth.height) = (5000, 5000);
+    assert!(matches!(crate::Fuser::new(&huge, None, settings()), Err(FusionError::Calibration { sensor: 0, .. })));
     let mut source = scene.source(&steps(3, 8.0));
     source.frames.iter_mut().for_each(|f| f.depth = None);
     assert!(matches!(fuse(&mut source, &settings(), &|_| {}), Err(FusionError::NoDepth { frames: 3 })));

@@ -148,7 +148,7 @@ fn associate(
 pub fn register(tsdf: &Tsdf, points: &[Sample], start: &Rigid) -> Tracked {
     let few: Vec<Sample> = points.iter().step_by(THINNING).copied().collect();
     let rough = descend(tsdf, &few, start, NEARLY);
-    let start = if rough.iterations < FINE_ITERATIONS { rough.scan_from_camera } else { *start };
+    let start = if rough.converged { rough.scan_from_camera } else { *start };
     let fine = descend(tsdf, points, &start, CONVERGED);
     Tracked { iterations: rough.iterations + fine.iterations, ..assess(tsdf, points, fine) }
 }

@@ -9,7 +9,7 @@ use crate::{
     StudioError,
     commands::{must_exist, reach},
     outcome::Answer,
-    pipeline::{Goal, Options, Run, fit},
+    pipeline::{Goal, Options, Run, fit, folders::Folders},
     run::Session,
 };
 
@@ -22,15 +22,40 @@ Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Fit {
+    #[command(flatten)]
+    person: Person,
+}
+
+/// Whose body: a subject's, or that of any scan.
+#[derive(Debug, clap::Args)]
+pub struct Person {
     /// The subject
     #[arg(required_unless_present = "scan", conflicts_with = "scan")]
-    subject: Option<PathBuf>,
-    /// Instead of a subject: any mesh of a standing person (PLY or OBJ), metres, +Y up
+    pub subject: Option<PathBuf>,
+    /// Instead of a subject: any mesh of a standing person, scan or body (PLY or OBJ), metres, +Y up
     #[arg(long, value_name = "MESH", requires = "out")]
-    scan: Option<PathBuf>,
+    pub scan: Option<PathBuf>,
     /// Folder of the result, with --scan
     #[arg(long, value_name = "DIR", requires = "scan")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
+}
+
+impl Person {
+    /// Fits the body, or reaches the subject's, and names the folder where its files are.
+    ///
+    /// # Errors
+    /// [`StudioError`] where there is no person in the scan, or files cannot be read or written.
+    pub fn fitted(&self, session: &Session) -> Result<(Answer, PathBuf), StudioError> {
+        match (&self.subject, &self.scan, &self.out) {
+            (Some(subject), ..) => {
+                must_exist(subject)?;
+                let answer = reach(subject, Goal::Body, &Options::default(), session)?;
+                Ok((answer, Folders::new(subject).body()))
+            }
+            (None, Some(scan), Some(out)) => Ok((fit_scan(scan, out, session)?, out.clone())),
+            _ => Err(StudioError::Usage("give a subject, or --scan MESH with --out DIR".into())),
+        }
+    }
 }
 
 impl Fit {
@@ -39,14 +64,7 @@ impl Fit {
     /// # Errors
     /// [`StudioError`] where there is no person in the scan, or files cannot be read or written.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
-        match (&self.subject, &self.scan, &self.out) {
-            (Some(subject), ..) => {
-                must_exist(subject)?;
-                reach(subject, Goal::Body, &Options::default(), session)
-            }
-            (None, Some(scan), Some(out)) => fit_scan(scan, out, session),
-            _ => Err(StudioError::Usage("give a subject, or --scan MESH with --out DIR".into())),
-        }
+        Ok(self.person.fitted(session)?.0)
     }
 }
 
@@ -54,7 +72,7 @@ impl Fit {
 ///
 /// # Errors
 /// As [`Fit::run`].
-pub fn fit_scan(scan: &Path, out: &Path, session: &Session) -> Result<Answer, StudioError> {
+fn fit_scan(scan: &Path, out: &Path, session: &Session) -> Result<Answer, StudioError> {
     must_exist(scan)?;
     let name = scan.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let run = Run::single(scan.parent().unwrap_or(Path::new(".")), &name, &session.progress);

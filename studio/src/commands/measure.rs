@@ -1,17 +1,11 @@
 //! `toile measure`: the measurements of a subject, or of any scan or body.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::json;
 use toile_fitting::MeasureTable;
 
-use crate::{
-    StudioError,
-    commands::{fit::fit_scan, must_exist, reach},
-    outcome::Answer,
-    pipeline::{Goal, Options, body_file::read_json, folders::Folders},
-    run::Session,
-};
+use crate::{StudioError, commands::fit::Person, outcome::Answer, pipeline::body_file::read_json, run::Session};
 
 const AFTER: &str = "\
 Girths as a taut tape lies, heights above the soles, standing straight. Fits the body first where that is missing.
@@ -24,15 +18,8 @@ Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Measure {
-    /// The subject
-    #[arg(required_unless_present = "scan", conflicts_with = "scan")]
-    subject: Option<PathBuf>,
-    /// Instead of a subject: any mesh of a standing person, scan or body (PLY or OBJ), metres, +Y up
-    #[arg(long, value_name = "MESH", requires = "out")]
-    scan: Option<PathBuf>,
-    /// Folder of the result, with --scan
-    #[arg(long, value_name = "DIR", requires = "scan")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    person: Person,
 }
 
 impl Measure {
@@ -41,15 +28,8 @@ impl Measure {
     /// # Errors
     /// [`StudioError`] where there is no person to measure, or files cannot be read or written.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
-        match (&self.subject, &self.scan, &self.out) {
-            (Some(subject), ..) => {
-                must_exist(subject)?;
-                let fitted = reach(subject, Goal::Body, &Options::default(), session)?;
-                measured(fitted, &Folders::new(subject).body())
-            }
-            (None, Some(scan), Some(out)) => measured(fit_scan(scan, out, session)?, out),
-            _ => Err(StudioError::Usage("give a subject, or --scan MESH with --out DIR".into())),
-        }
+        let (fitted, folder) = self.person.fitted(session)?;
+        measured(fitted, &folder)
     }
 }
 
