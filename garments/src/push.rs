@@ -1,23 +1,18 @@
-//! A displacement of cloth that follows pushes at samples and spreads them smoothly.
+//! A displacement of all layers at once that follows pushes at points of them and spreads them smoothly.
 
-use nalgebra::{Point3, Vector3};
-use toile_geometry::{
-    Mesh,
-    intersection::{crossings, segment_crosses},
-    triangle::ray_hit,
-};
+use nalgebra::Vector3;
+use toile_geometry::{Mesh, topology::VertexNeighbors};
 
-use crate::{
-    lower_surface::LowerSurface,
-    surface_solve::{SurfaceSystem, conjugate_gradients},
-};
+use crate::surface_solve::{SurfaceSystem, conjugate_gradients};
 
 /// How much more a push weighs than the cloth's stiffness.
 const STIFF: f32 = 30.0;
 /// Displacements under this are left out, metres: what is not pushed stays to the bit.
 const LEAST: f32 = 2e-6;
+/// Beyond this many spreads from a push nothing moves.
+const FAR: f32 = 4.0;
 
-/// A point of the upper layer that has to move.
+/// A point that has to move.
 #[derive(Debug, Clone, Copy)]
 pub struct Push {
     /// The vertices that carry it.
@@ -28,79 +23,78 @@ pub struct Push {
     pub by: Vector3<f32>,
 }
 
-/// Moves the mesh by the smooth displacement that follows `pushes`, which die out over `spread` metres. Each push acts
-/// on all vertices that carry its point, by their shares, so that nothing moves further than the largest push. Returns
-/// how far each vertex moved.
-pub fn displace(mesh: &mut Mesh, system: &SurfaceSystem, pushes: &[Push], spread: f32) -> Vec<f32> {
-    let n = mesh.positions.len();
-    let anchor = 1.0 / (spread * spread).max(1e-8);
-    let mut mass: Vec<f32> = system.areas.iter().map(|a| a * anchor + 1e-6).collect();
-    let mut right = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
-    for push in pushes {
-        for (&v, w) in push.corners.iter().zip(push.weights) {
-            mass[v as usize] += STIFF * w;
-            (0..3).for_each(|k| right[k][v as usize] += STIFF * w * push.by[k]);
-        }
-    }
-    let diagonal: Vec<f32> = system.diagonal().iter().zip(&mass).map(|(d, m)| d + m).collect();
-    let axes = right.map(|right| {
-        conjugate_gradients(&right, vec![0.0; n], &diagonal, |x, out| {
-            for v in 0..n {
-                out[v] = mass[v] * x[v];
-            }
-            system.add_stiffness(x, out);
-        })
-    });
-    mesh.positions
-        .iter_mut()
-        .enumerate()
-        .map(|(v, p)| {
-            let d = Vector3::new(axes[0][v], axes[1][v], axes[2][v]);
-            if d.norm() < LEAST {
-                return 0.0;
-            }
-            *p += d;
-            d.norm()
-        })
-        .collect()
+/// All layers' cloth as one elastic surface.
+pub struct Cloth {
+    system: SurfaceSystem,
+    neighbors: VertexNeighbors,
+    edge_length: f32,
 }
 
-/// Pushes by `distance` along the lower layer's normal wherever an edge of either layer passes through a triangle of
-/// the other.
-pub fn crossing_pushes(upper: &Mesh, lowers: &[LowerSurface], distance: f32) -> Vec<Push> {
-    let mut pushes = Vec::new();
-    for lower in lowers {
-        for [t, u] in crossings(upper, lower.mesh, &lower.bvh) {
-            let (x, y) = (upper.corners(t as usize), lower.mesh.corners(u as usize));
-            let by = lower.smooth_normal(u, [1.0 / 3.0; 3]) * distance;
-            let corners = upper.triangles[t as usize];
-            for k in 0..3 {
-                if let Some(weights) = upper_edge_point(&x, k, &y).or_else(|| lower_edge_point(&x, k, &y)) {
-                    pushes.push(Push { corners, weights, by });
+impl Cloth {
+    /// Reads a mesh, in one or many pieces.
+    pub fn new(mesh: &Mesh) -> Self {
+        let area = mesh.area() as f32 / mesh.triangles.len().max(1) as f32;
+        Self {
+            system: SurfaceSystem::new(mesh),
+            neighbors: VertexNeighbors::new(mesh.positions.len(), &mesh.triangles),
+            // The side of an equilateral triangle of the mean area.
+            edge_length: (area * 4.0 / 3.0f32.sqrt()).sqrt().max(1e-4),
+        }
+    }
+
+    /// The smooth displacement of each vertex that follows `pushes`, which die out over `spread` metres; nothing for
+    /// vertices far from all pushes. Each push acts on all vertices that carry its point, by their shares, so that
+    /// nothing moves further than the largest push. Minimises Σ stiff·(d − push)² + ∫ |∇d|² + |d|² / spread².
+    pub fn displacement(&self, pushes: &[Push], spread: f32) -> Vec<(u32, Vector3<f32>)> {
+        let patch = self.around(pushes, spread);
+        let mut local = vec![u32::MAX; self.system.len()];
+        patch.iter().enumerate().for_each(|(i, &v)| local[v as usize] = i as u32);
+        let (system, held) = self.system.part(&patch, &local);
+        let anchor = 1.0 / (spread * spread).max(1e-8);
+        let mut mass: Vec<f32> = system.areas.iter().zip(held).map(|(a, h)| a * anchor + 1e-6 + h).collect();
+        let mut right = [vec![0.0; patch.len()], vec![0.0; patch.len()], vec![0.0; patch.len()]];
+        for push in pushes {
+            for (&v, w) in push.corners.iter().zip(push.weights) {
+                let v = local[v as usize] as usize;
+                mass[v] += STIFF * w;
+                (0..3).for_each(|k| right[k][v] += STIFF * w * push.by[k]);
+            }
+        }
+        let diagonal: Vec<f32> = system.diagonal().iter().zip(&mass).map(|(d, m)| d + m).collect();
+        let [x, y, z] = right.map(|right| {
+            conjugate_gradients(&right, vec![0.0; patch.len()], &diagonal, |x, out| {
+                out.iter_mut().zip(&mass).zip(x).for_each(|((o, m), x)| *o = m * x);
+                system.add_stiffness(x, out);
+            })
+        });
+        let moves = patch.iter().enumerate().map(|(i, &v)| (v, Vector3::new(x[i], y[i], z[i])));
+        moves.filter(|(_, d)| d.norm() >= LEAST).collect()
+    }
+
+    /// The pushed vertices and some rings around them, ascending.
+    fn around(&self, pushes: &[Push], spread: f32) -> Vec<u32> {
+        let rings = (FAR * spread / self.edge_length).ceil() as usize;
+        let seeds = pushes.iter().flat_map(|p| p.corners).collect();
+        grow(seeds, &self.neighbors, rings)
+    }
+}
+
+/// The vertices `seeds` and `rings` rings around them, ascending.
+pub fn grow(mut seeds: Vec<u32>, neighbors: &VertexNeighbors, rings: usize) -> Vec<u32> {
+    seeds.sort_unstable();
+    seeds.dedup();
+    let mut start = 0;
+    let mut found: std::collections::BTreeSet<u32> = seeds.iter().copied().collect();
+    for _ in 0..rings {
+        let end = seeds.len();
+        for i in start..end {
+            for &n in neighbors.of(seeds[i] as usize) {
+                if found.insert(n) {
+                    seeds.push(n);
                 }
             }
         }
+        start = end;
     }
-    pushes
-}
-
-/// Where side k of the upper triangle passes through the lower one.
-fn upper_edge_point(x: &[Point3<f32>; 3], k: usize, y: &[Point3<f32>; 3]) -> Option<[f32; 3]> {
-    let (p, q) = (x[k], x[(k + 1) % 3]);
-    if !segment_crosses(&p, &q, y) {
-        return None;
-    }
-    let t = ray_hit(&p, &(q - p), y).map_or(0.5, |h| h.0.clamp(0.0, 1.0));
-    let mut weights = [0.0; 3];
-    (weights[k], weights[(k + 1) % 3]) = (1.0 - t, t);
-    Some(weights)
-}
-
-/// Where side k of the lower triangle passes through the upper one.
-fn lower_edge_point(x: &[Point3<f32>; 3], k: usize, y: &[Point3<f32>; 3]) -> Option<[f32; 3]> {
-    let (p, q) = (y[k], y[(k + 1) % 3]);
-    if !segment_crosses(&p, &q, x) {
-        return None;
-    }
-    Some(ray_hit(&p, &(q - p), x).map_or([1.0 / 3.0; 3], |h| h.1))
+    found.into_iter().collect()
 }

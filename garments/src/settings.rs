@@ -68,7 +68,7 @@ pub struct StackSettings {
     pub gap: f32,
     /// Distance over which a push spreads into its surroundings, metres. Default 0.015.
     pub spread: f32,
-    /// Most rounds of pushing a layer. Default 40.
+    /// Most rounds. Default 80.
     pub rounds: usize,
     /// Heights are read up to this distance from a lower layer, metres. Default 0.05.
     pub reach: f32,
@@ -76,6 +76,6 @@ pub struct StackSettings {
 
 impl Default for StackSettings {
     fn default() -> Self {
-        Self { gap: 0.0015, spread: 0.015, rounds: 40, reach: 0.05 }
+        Self { gap: 0.0015, spread: 0.015, rounds: 80, reach: 0.05 }
     }
 }

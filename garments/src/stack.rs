@@ -1,38 +1,40 @@
-//! Every layer outside all layers below it (Hu et al. 2017, eq. 7, with the push spread over the cloth and repeated
-//! until an exact test finds nothing).
+//! Every layer outside all layers below it: Hu et al. 2017, eq. 7, as one problem over all layers, repeated until an
+//! exact test finds nothing.
 //!
-//! Points of the upper layer are held at least a gap over each lower one: its vertices, the points closest to the
-//! lower layer's vertices, and the points where edges still cross. A round moves the cloth by the displacement field d
-//! that minimises Σ (d(sample) − push)² · stiff + ∫ |∇d|² + |d|² / spread².
+//! Points of an upper layer are held at least a gap over each lower one: its vertices, the points closest to the lower
+//! layer's vertices, and the points where edges still cross. A round moves all layers together by the displacement
+//! field d that minimises Σ (d(point) − push)² · stiff + ∫ |∇d|² + |d|² / spread²; of what a pair has to move apart the
+//! lower layer takes a share at first, so that what was scanned last is not the only one to give way, and later none.
+//! Where that does not help, the layers are crumpled there: they are smoothed around the place, wider each time.
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
-use toile_geometry::{
-    Mesh,
-    bvh::Bvh,
-    intersection::{crossings, self_crossings},
-};
+use toile_geometry::{Mesh, bvh::Bvh, intersection::self_crossings};
 
 use crate::{
     GarmentError, StackSettings,
-    lower_surface::LowerSurface,
-    push::{Push, crossing_pushes, displace},
-    surface_solve::SurfaceSystem,
-    untangle::untangle,
+    contacts::{Contact, Contacts, crossing_pairs},
+    push::{Cloth, Push, grow},
+    untangle::{smooth, untangle},
+    worn_surface::WornSurface,
 };
 
-/// Pushes aim this much beyond the gap, so that rounds end.
-const AIM: f32 = 1.15;
-/// Heights under this share of the gap are pushed.
-const ENOUGH: f32 = 0.9;
-/// Lower vertices are looked at when the upper layer is this near, metres.
-const NEAR: f32 = 0.02;
 /// Crossings are pushed by at most this many gaps a round.
 const MOST_CROSSING: f32 = 3.0;
-/// Rounds without progress after which stacking gives up.
-const PATIENCE: usize = 10;
-/// Lower vertices in a parallel chunk.
-const CHUNK: usize = 512;
+/// Fewer samples than this that lack their gap: crossings are looked for too.
+const FEW: usize = 60;
+/// Every so many rounds crossings are looked for in any case.
+const LOOK_AGAIN: usize = 4;
+/// Share of a push that the lower layer takes in the first round; it shrinks to nothing over so many rounds.
+const LOWER_SHARE: f32 = 0.4;
+const LOWER_ROUNDS: usize = 8;
+/// Rounds without progress after which layers are smoothed around what is left.
+const PATIENCE: usize = 4;
+/// Rings of vertices that are smoothed the first time, and how many more each time.
+const SMOOTH_RINGS: usize = 2;
+/// Steps of that smoothing.
+const SMOOTH_STEPS: usize = 6;
 
 /// Upper ends of the bins of [`LayerReport::gaps`], millimetres.
 pub const GAP_BINS_MM: [f32; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
@@ -57,6 +59,10 @@ pub struct LayerReport {
     pub moved_mean_m: f32,
     /// Largest distance that a vertex moved, metres.
     pub moved_max_m: f32,
+    /// Mean distance that those vertices moved which the scan saw (attribute `filled` under a half), metres.
+    pub moved_seen_mean_m: f32,
+    /// The distance that 95 % of those moved less than, metres.
+    pub moved_seen_p95_m: f32,
 }
 
 /// What stacking did.
@@ -80,84 +86,182 @@ pub fn stack(
     for mesh in std::iter::once(body).chain(layers.iter()) {
         mesh.validate().map_err(|e| GarmentError::Mesh(format!("a layer to stack: {e}")))?;
     }
+    let own_before: Vec<usize> = layers.iter().map(own_crossings).collect();
+    let mut pile = Pile::new(body, layers);
+    let (rounds, left) = pile.part(settings, progress);
     let mut report = StackReport::default();
-    let count = layers.len();
-    for k in 0..count {
-        let (below, rest) = layers.split_at_mut(k);
-        let lowers: Vec<LowerSurface> =
-            std::iter::once(body).chain(below.iter()).filter(|m| !m.is_empty()).map(LowerSurface::new).collect();
-        report.layers.push(push_out(&mut rest[0], &lowers, settings));
-        progress((k + 1) as f32 / count as f32);
+    for (k, layer) in layers.iter_mut().enumerate() {
+        let start = std::mem::replace(&mut layer.positions, pile.surfaces[k + 1].mesh.positions.clone());
+        let moved: Vec<f32> = layer.positions.iter().zip(&start).map(|(a, b)| (a - b).norm()).collect();
+        let crossing = crossing_pairs(&pile.surfaces, k + 1);
+        let mut told = LayerReport {
+            rounds,
+            settled: crossing == 0 && left.iter().all(|c| c.upper.surface != k + 1),
+            crossing_pairs: crossing,
+            self_crossings: [own_before[k], own_crossings(layer)],
+            ..LayerReport::default()
+        };
+        told.read_gaps(&pile.surfaces[..=k + 1], settings);
+        told.read_moves(layer, moved);
+        report.layers.push(told);
+        if layer.positions != start {
+            layer.recompute_normals();
+        }
     }
     Ok(report)
 }
 
-fn push_out(upper: &mut Mesh, lowers: &[LowerSurface], settings: &StackSettings) -> LayerReport {
-    if upper.is_empty() {
-        return LayerReport { settled: true, ..LayerReport::default() };
+/// All layers while they are moved; surface 0 is the body.
+struct Pile {
+    surfaces: Vec<WornSurface>,
+    /// First vertex of each surface in `cloth`.
+    starts: Vec<u32>,
+    cloth: Cloth,
+}
+
+impl Pile {
+    fn new(body: &Mesh, layers: &[Mesh]) -> Self {
+        let surfaces: Vec<WornSurface> =
+            std::iter::once(body).chain(layers).collect::<Vec<_>>().into_par_iter().map(WornSurface::new).collect();
+        let mut all = Mesh::default();
+        let mut starts = Vec::new();
+        for surface in &surfaces {
+            let start = all.positions.len() as u32;
+            starts.push(start);
+            all.positions.extend(&surface.mesh.positions);
+            all.triangles.extend(surface.mesh.triangles.iter().map(|t| t.map(|v| v + start)));
+        }
+        Self { cloth: Cloth::new(&all), surfaces, starts }
     }
-    let start = upper.positions.clone();
-    let own_before = own_crossings(upper);
-    let system = SurfaceSystem::new(upper);
-    let mut watch = Watch::new(upper, lowers);
-    let mut report = LayerReport::default();
-    let mut fresh = false;
-    let mut patience = Patience::default();
-    for round in 0..settings.rounds {
-        report.rounds = round + 1;
-        let mut pushes = watch.samples(upper, lowers, settings);
-        if pushes.is_empty() {
+
+    /// Moves the layers apart. Returns the rounds it took and the contacts that were left.
+    fn part(&mut self, settings: &StackSettings, progress: &(dyn Fn(f32) + Sync)) -> (usize, Vec<Contact>) {
+        let mut contacts = Contacts::new(&self.surfaces);
+        let mut patience = Patience::default();
+        let (mut fresh, mut dirty) = (true, vec![true; self.surfaces.len()]);
+        for round in 0..settings.rounds {
+            let found = self.found(&mut contacts, round, fresh, settings);
+            if found.is_empty() && fresh {
+                // Believed only after the layers were untangled and everything was looked at afresh.
+                if !self.untangle(&mut dirty) {
+                    return (round + 1, found);
+                }
+            }
+            if found.is_empty() {
+                (contacts, fresh) = (Contacts::new(&self.surfaces), true);
+                continue;
+            }
+            fresh = false;
+            let before: Vec<_> = self.surfaces.iter().map(|s| s.mesh.positions.clone()).collect();
+            if patience.goes_on(found.len()) {
+                self.push(&found, round, settings);
+            } else {
+                self.smooth_around(&found, SMOOTH_RINGS * patience.lost());
+            }
+            let moved = self.refresh(&before);
+            dirty.iter_mut().zip(&moved).for_each(|(d, m)| *d |= !m.is_empty());
+            contacts.moved(&self.surfaces, &moved, settings.reach);
+            progress((round + 1) as f32 / settings.rounds as f32);
+        }
+        (settings.rounds, Contacts::new(&self.surfaces).samples(&self.surfaces, settings))
+    }
+
+    /// Samples that lack their gap; where these are few, or now and then, crossings too.
+    fn found(&self, contacts: &mut Contacts, round: usize, fresh: bool, settings: &StackSettings) -> Vec<Contact> {
+        let mut found = contacts.samples(&self.surfaces, settings);
+        if fresh || found.len() < FEW || round % LOOK_AGAIN == LOOK_AGAIN - 1 {
             // Each crossing asks for a little more than the last one, until it gives way.
             let more = (1.0 + 0.25 * round as f32).min(MOST_CROSSING);
-            pushes = crossing_pushes(upper, lowers, settings.gap * more);
+            found.extend(contacts.crossings(&self.surfaces, settings.gap * more));
         }
-        if pushes.is_empty() {
-            // Believed only after the layer was untangled and everything was looked at afresh.
-            if fresh {
-                report.settled = true;
-                break;
+        found
+    }
+
+    fn push(&mut self, found: &[Contact], round: usize, settings: &StackSettings) {
+        let fade = 1.0 - (round as f32 / LOWER_ROUNDS as f32).min(1.0);
+        let mut pushes = Vec::with_capacity(2 * found.len());
+        for contact in found {
+            let share = if contact.lower.surface == 0 { 0.0 } else { LOWER_SHARE * fade };
+            for (anchor, share) in [(contact.upper, 1.0 - share), (contact.lower, -share)] {
+                let corners = anchor.corners.map(|v| v + self.starts[anchor.surface]);
+                if share != 0.0 {
+                    pushes.push(Push { corners, weights: anchor.weights, by: contact.by * share });
+                }
             }
-            untangle(upper);
-            (watch, fresh) = (Watch::new(upper, lowers), true);
-            continue;
-        }
-        fresh = false;
-        if !patience.goes_on(pushes.len()) {
-            break;
         }
         // Late rounds act locally, so that opposing pushes do not carry each other along.
         let spread = settings.spread / (1.0 + round as f32 / 8.0);
-        let moved = displace(upper, &system, &pushes, spread);
-        watch.moved(&moved);
+        for (v, by) in self.cloth.displacement(&pushes, spread) {
+            self.shift(v, by);
+        }
     }
-    report.crossing_pairs = lowers.iter().map(|l| crossings(upper, l.mesh, &l.bvh).len()).sum();
-    report.self_crossings = [own_before, own_crossings(upper)];
-    let heights = heights(upper, lowers, settings);
-    report.least_gap_m = heights.iter().copied().fold(settings.reach, f32::min);
-    report.gaps = histogram(&heights);
-    let moved: Vec<f32> = upper.positions.iter().zip(&start).map(|(a, b)| (a - b).norm()).collect();
-    report.moved_mean_m = moved.iter().sum::<f32>() / moved.len().max(1) as f32;
-    report.moved_max_m = moved.iter().copied().fold(0.0, f32::max);
-    upper.recompute_normals();
-    report
+
+    fn shift(&mut self, v: u32, by: Vector3<f32>) {
+        let surface = self.starts.partition_point(|&s| s <= v) - 1;
+        self.surfaces[surface].mesh.positions[(v - self.starts[surface]) as usize] += by;
+    }
+
+    /// Smooths both layers of each contact around it.
+    fn smooth_around(&mut self, found: &[Contact], rings: usize) {
+        let mut seeds = vec![Vec::new(); self.surfaces.len()];
+        for anchor in found.iter().flat_map(|c| [c.upper, c.lower]).filter(|a| a.surface > 0) {
+            seeds[anchor.surface].extend(anchor.corners);
+        }
+        for (surface, seeds) in self.surfaces.iter_mut().zip(seeds).filter(|(_, s)| !s.is_empty()) {
+            let patch = grow(seeds, &surface.neighbors, rings);
+            smooth(&mut surface.mesh, &surface.neighbors, &patch, SMOOTH_STEPS);
+        }
+    }
+
+    /// Takes self-crossings out of the layers that moved. True where that changed anything.
+    fn untangle(&mut self, dirty: &mut [bool]) -> bool {
+        let before: Vec<_> = self.surfaces.iter().map(|s| s.mesh.positions.clone()).collect();
+        for (surface, dirty) in self.surfaces.iter_mut().zip(dirty).skip(1).filter(|(_, d)| **d) {
+            untangle(&mut surface.mesh);
+            *dirty = false;
+        }
+        self.refresh(&before).iter().any(|m| !m.is_empty())
+    }
+
+    /// How far vertices moved since `before`, by surface; empty for those where none did. Refreshes the others.
+    fn refresh(&mut self, before: &[Vec<nalgebra::Point3<f32>>]) -> Vec<Vec<f32>> {
+        let refresh = |(surface, before): (&mut WornSurface, &Vec<_>)| {
+            if surface.mesh.positions == *before {
+                return Vec::new();
+            }
+            surface.refresh();
+            surface.mesh.positions.iter().zip(before).map(|(a, b)| (a - b).norm()).collect()
+        };
+        self.surfaces.par_iter_mut().zip(before).map(refresh).collect()
+    }
 }
 
-/// Gives up on layers that cannot be parted, such as a sheet through a limb.
+/// Notices when rounds do not help.
 #[derive(Default)]
 struct Patience {
     best: Option<usize>,
     since: usize,
+    lost: usize,
 }
 
 impl Patience {
-    /// Takes note of the pushes left; false when they have not become fewer for some rounds.
+    /// Takes note of the contacts left; false when they have not become fewer for some rounds.
     fn goes_on(&mut self, left: usize) -> bool {
         if self.best.is_none_or(|best| left < best) {
             (self.best, self.since) = (Some(left), 0);
         } else {
             self.since += 1;
         }
-        self.since <= PATIENCE
+        if self.since > PATIENCE {
+            *self = Self { best: None, since: 0, lost: self.lost + 1 };
+            return false;
+        }
+        true
+    }
+
+    /// How many times it was lost.
+    fn lost(&self) -> usize {
+        self.lost
     }
 }
 
@@ -165,106 +269,27 @@ fn own_crossings(mesh: &Mesh) -> usize {
     self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles)).len()
 }
 
-/// Height of every vertex over the lower layer that it is nearest to; infinite over none.
-fn heights(upper: &Mesh, lowers: &[LowerSurface], settings: &StackSettings) -> Vec<f32> {
-    let least =
-        |p| lowers.iter().filter_map(|l| l.height(p, settings.reach)).map(|h| h.value).fold(f32::INFINITY, f32::min);
-    upper.positions.par_iter().map(least).collect()
-}
-
-fn histogram(heights: &[f32]) -> [f32; GAP_BINS_MM.len() + 1] {
-    let mut shares = [0.0; GAP_BINS_MM.len() + 1];
-    for h in heights {
-        let bin = GAP_BINS_MM.iter().position(|end| h * 1e3 < *end).unwrap_or(GAP_BINS_MM.len());
-        shares[bin] += 1.0 / heights.len() as f32;
-    }
-    shares
-}
-
-/// Remembers how far each sample is from needing a push, so that a round looks only at those that may.
-struct Watch {
-    /// Slack of upper vertices, by lower layer.
-    vertices: Vec<Vec<f32>>,
-    /// Slack of lower vertices, by lower layer.
-    lower_vertices: Vec<Vec<f32>>,
-}
-
-impl Watch {
-    fn new(upper: &Mesh, lowers: &[LowerSurface]) -> Self {
-        Self {
-            vertices: vec![vec![0.0; upper.positions.len()]; lowers.len()],
-            lower_vertices: lowers.iter().map(|l| vec![0.0; l.mesh.positions.len()]).collect(),
+impl LayerReport {
+    /// Heights of every vertex of the last surface over the one below that it is nearest to.
+    fn read_gaps(&mut self, surfaces: &[WornSurface], settings: &StackSettings) {
+        let Some((upper, lowers)) = surfaces.split_last() else { return };
+        let least = |p| lowers.iter().filter_map(|l| l.height(p, settings.reach)).fold(f32::INFINITY, f32::min);
+        let heights: Vec<f32> = upper.mesh.positions.par_iter().map(least).collect();
+        self.least_gap_m = heights.iter().copied().fold(settings.reach, f32::min);
+        for h in &heights {
+            let bin = GAP_BINS_MM.iter().position(|end| h * 1e3 < *end).unwrap_or(GAP_BINS_MM.len());
+            self.gaps[bin] += 1.0 / heights.len() as f32;
         }
     }
 
-    /// Takes the distances moved off the slacks.
-    fn moved(&mut self, moved: &[f32]) {
-        let most = moved.iter().copied().fold(0.0, f32::max);
-        self.vertices.iter_mut().for_each(|slacks| slacks.iter_mut().zip(moved).for_each(|(s, m)| *s -= m));
-        self.lower_vertices.iter_mut().flatten().for_each(|s| *s -= most);
+    fn read_moves(&mut self, layer: &Mesh, moved: Vec<f32>) {
+        let mean = |m: &[f32]| m.iter().sum::<f32>() / m.len().max(1) as f32;
+        (self.moved_mean_m, self.moved_max_m) = (mean(&moved), moved.iter().copied().fold(0.0, f32::max));
+        let filled = layer.attributes.get("filled");
+        let seen = |v: usize| filled.is_none_or(|f| f[v] < 0.5);
+        let mut seen: Vec<f32> = (0..moved.len()).filter(|&v| seen(v)).map(|v| moved[v]).collect();
+        self.moved_seen_mean_m = mean(&seen);
+        seen.sort_by(f32::total_cmp);
+        self.moved_seen_p95_m = seen.get(seen.len() * 95 / 100).copied().unwrap_or(0.0);
     }
-
-    /// All pushes that upper vertices and the points nearest to lower vertices need.
-    fn samples(&mut self, upper: &Mesh, lowers: &[LowerSurface], settings: &StackSettings) -> Vec<Push> {
-        let bvh = Bvh::new(&upper.positions, &upper.triangles);
-        let mut pushes = Vec::new();
-        for (j, lower) in lowers.iter().enumerate() {
-            let probe = |v: usize| probe_vertex(upper, lower, v, settings);
-            look(&mut self.vertices[j], probe, &mut pushes);
-            let probe = |u: usize| probe_lower_vertex(upper, &bvh, lower, u, settings);
-            look(&mut self.lower_vertices[j], probe, &mut pushes);
-        }
-        pushes
-    }
-}
-
-/// Probes whatever has no slack left; renews the slacks and collects the pushes in order.
-fn look(slacks: &mut [f32], probe: impl Fn(usize) -> (f32, Option<Push>) + Sync, pushes: &mut Vec<Push>) {
-    let found: Vec<Vec<Push>> = slacks
-        .par_chunks_mut(CHUNK)
-        .enumerate()
-        .map(|(chunk, slacks)| {
-            let mut found = Vec::new();
-            for (i, slack) in slacks.iter_mut().enumerate().filter(|(_, s)| **s <= 0.0) {
-                let (renewed, push) = probe(chunk * CHUNK + i);
-                *slack = renewed;
-                found.extend(push);
-            }
-            found
-        })
-        .collect();
-    pushes.extend(found.into_iter().flatten());
-}
-
-/// Slack of an upper vertex over a lower layer, and the push that it needs.
-fn probe_vertex(upper: &Mesh, lower: &LowerSurface, v: usize, settings: &StackSettings) -> (f32, Option<Push>) {
-    let p = upper.positions[v];
-    let Some(h) = lower.height(&p, settings.reach) else {
-        // Beyond reach there is slack; beside a rim it has to be looked at again.
-        let near = lower.bvh.closest(&p, settings.reach).is_some();
-        return (if near { 0.0 } else { settings.reach - settings.gap }, None);
-    };
-    if h.value >= ENOUGH * settings.gap {
-        return (h.value - ENOUGH * settings.gap, None);
-    }
-    let push = h.point + h.normal * (settings.gap * AIM) - p;
-    (0.0, Some(Push { corners: [v as u32; 3], weights: [1.0, 0.0, 0.0], by: push }))
-}
-
-/// The same for the upper layer's point nearest to a lower vertex.
-fn probe_lower_vertex(
-    upper: &Mesh,
-    bvh: &Bvh,
-    lower: &LowerSurface,
-    u: usize,
-    settings: &StackSettings,
-) -> (f32, Option<Push>) {
-    let Some(hit) = bvh.closest(&lower.mesh.positions[u], NEAR) else { return (NEAR - settings.gap, None) };
-    let Some(h) = lower.height(&hit.point, NEAR) else { return (0.0, None) };
-    if h.value >= ENOUGH * settings.gap {
-        return (h.value - ENOUGH * settings.gap, None);
-    }
-    let push = h.point + h.normal * (settings.gap * AIM) - hit.point;
-    let corners = upper.triangles[hit.triangle as usize];
-    (0.0, Some(Push { corners, weights: hit.barycentric, by: push }))
 }

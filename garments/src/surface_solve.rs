@@ -51,6 +51,28 @@ impl SurfaceSystem {
         system
     }
 
+    /// The system of some `vertices` (`local` maps all vertices to their place among them, or to `u32::MAX`) while all
+    /// others are held at zero, and what their being held adds to the diagonal.
+    pub fn part(&self, vertices: &[u32], local: &[u32]) -> (Self, Vec<f32>) {
+        let mut part = Self { areas: Vec::new(), starts: vec![0], others: Vec::new(), stiffness: Vec::new() };
+        let mut held = vec![0.0; vertices.len()];
+        for (i, &v) in vertices.iter().enumerate() {
+            let v = v as usize;
+            part.areas.push(self.areas[v]);
+            for k in self.starts[v] as usize..self.starts[v + 1] as usize {
+                match local[self.others[k] as usize] {
+                    u32::MAX => held[i] += self.stiffness[k],
+                    other => {
+                        part.others.push(other);
+                        part.stiffness.push(self.stiffness[k]);
+                    }
+                }
+            }
+            part.starts.push(part.others.len() as u32);
+        }
+        (part, held)
+    }
+
     /// How many vertices there are.
     pub fn len(&self) -> usize {
         self.areas.len()

@@ -7,6 +7,8 @@ use toile_geometry::{
     topology::{Edges, VertexNeighbors},
 };
 
+use crate::push::grow;
+
 /// Most rounds.
 const ROUNDS: usize = 12;
 /// Rings of neighbours that are smoothed around a crossing in the first round; one more every third round.
@@ -25,33 +27,20 @@ pub fn untangle(mesh: &mut Mesh) -> usize {
         let neighbors = neighbors.get_or_insert_with(|| VertexNeighbors::new(mesh.positions.len(), &mesh.triangles));
         let seeds = pairs.iter().flatten().flat_map(|&t| mesh.triangles[t as usize]);
         let patch = grow(seeds.collect(), neighbors, RINGS + round / 3);
-        smooth(mesh, neighbors, &patch);
+        smooth(mesh, neighbors, &patch, STEPS);
     }
     0
 }
 
-/// The vertices and `rings` rings around them, ascending.
-fn grow(mut patch: Vec<u32>, neighbors: &VertexNeighbors, rings: usize) -> Vec<u32> {
-    for _ in 0..rings {
-        let more: Vec<u32> = patch.iter().flat_map(|&v| neighbors.of(v as usize)).copied().collect();
-        patch.extend(more);
-        patch.sort_unstable();
-        patch.dedup();
-    }
-    patch.sort_unstable();
-    patch.dedup();
-    patch
-}
-
-/// Moves each vertex of the patch halfway to its neighbours' mean; vertices of a rim heed only the rim.
-fn smooth(mesh: &mut Mesh, neighbors: &VertexNeighbors, patch: &[u32]) {
+/// Moves each vertex of the patch halfway to its neighbours' mean, `steps` times; vertices of a rim heed only the rim.
+pub fn smooth(mesh: &mut Mesh, neighbors: &VertexNeighbors, patch: &[u32], steps: usize) {
     let edges = Edges::new(&mesh.triangles);
     let mut rim = std::collections::BTreeMap::<u32, Vec<u32>>::new();
     for (&[a, b], _) in edges.vertices.iter().zip(&edges.uses).filter(|(_, u)| **u == 1) {
         rim.entry(a).or_default().push(b);
         rim.entry(b).or_default().push(a);
     }
-    for _ in 0..STEPS {
+    for _ in 0..steps {
         let moved: Vec<_> = patch
             .iter()
             .map(|&v| {

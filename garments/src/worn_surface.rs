@@ -1,10 +1,10 @@
-//! How high points lie over a surface that other layers must stay outside of.
+//! A layer while it is stacked: its surface, and how high points lie over it.
 
 use nalgebra::{Point3, Vector3};
 use toile_geometry::{
     Mesh,
     bvh::{Bvh, Closest},
-    topology::Edges,
+    topology::{Edges, VertexNeighbors},
 };
 
 /// A point this far beyond the rim along the surface is not over it any more, metres.
@@ -12,16 +12,19 @@ const BEYOND_RIM: f32 = 0.001;
 /// Barycentric coordinate under which the closest point counts as on the side.
 const ON_SIDE: f32 = 1e-4;
 
-/// A lower layer, ready for queries.
-pub struct LowerSurface<'a> {
-    /// Its mesh.
-    pub mesh: &'a Mesh,
+/// A layer, ready for queries.
+pub struct WornSurface {
+    /// Its positions and triangles.
+    pub mesh: Mesh,
     /// Its hierarchy.
     pub bvh: Bvh,
     /// Its unit vertex normals.
     pub normals: Vec<Vector3<f32>>,
+    /// Its vertices' neighbours.
+    pub neighbors: VertexNeighbors,
+    /// True for vertices of open sides.
+    pub open_vertices: Vec<bool>,
     open_sides: Vec<[bool; 3]>,
-    open_vertices: Vec<bool>,
 }
 
 /// A point's place over a surface.
@@ -30,14 +33,26 @@ pub struct Height {
     /// Signed distance, metres: negative inside.
     pub value: f32,
     /// The closest point.
-    pub point: Point3<f32>,
+    pub hit: Closest,
     /// The surface's smooth normal there.
     pub normal: Vector3<f32>,
 }
 
-impl<'a> LowerSurface<'a> {
+/// What there is to say about a point near a surface.
+#[derive(Debug, Clone, Copy)]
+pub enum Place {
+    /// Beyond reach.
+    Far,
+    /// Next to the rim, this far beside it, metres.
+    Beside(f32),
+    /// Over or under the surface.
+    Over(Height),
+}
+
+impl WornSurface {
     /// Reads a mesh.
-    pub fn new(mesh: &'a Mesh) -> Self {
+    pub fn new(mesh: &Mesh) -> Self {
+        let mesh = Mesh::new(mesh.positions.clone(), mesh.triangles.clone());
         let edges = Edges::new(&mesh.triangles);
         let open = |e: u32| edges.uses[e as usize] == 1;
         let mut open_vertices = vec![false; mesh.positions.len()];
@@ -45,25 +60,40 @@ impl<'a> LowerSurface<'a> {
             e.iter().for_each(|&v| open_vertices[v as usize] = true);
         }
         Self {
-            open_vertices,
-            mesh,
             bvh: Bvh::new(&mesh.positions, &mesh.triangles),
             normals: mesh.vertex_normals(),
+            neighbors: VertexNeighbors::new(mesh.positions.len(), &mesh.triangles),
             open_sides: edges.of_triangle.iter().map(|s| s.map(open)).collect(),
+            open_vertices,
+            mesh,
         }
     }
 
-    /// Height of `p` over the surface, if it is within `reach` and not beyond the rim.
-    pub fn height(&self, p: &Point3<f32>, reach: f32) -> Option<Height> {
-        let hit = self.bvh.closest(p, reach)?;
+    /// Takes note that the mesh's positions have changed.
+    pub fn refresh(&mut self) {
+        self.bvh = Bvh::new(&self.mesh.positions, &self.mesh.triangles);
+        self.normals = self.mesh.vertex_normals();
+    }
+
+    /// Where `p` lies, looking up to `reach` metres far.
+    pub fn place(&self, p: &Point3<f32>, reach: f32) -> Place {
+        let Some(hit) = self.bvh.closest(p, reach) else { return Place::Far };
         let normal = self.smooth_normal(hit.triangle, hit.barycentric);
         let away = p - hit.point;
         let up = away.dot(&normal);
-        let beside = (away - normal * up).norm() > BEYOND_RIM;
-        if beside && self.on_rim(&hit) {
-            return None;
+        let beside = (away - normal * up).norm();
+        if beside > BEYOND_RIM && self.on_rim(&hit) {
+            return Place::Beside(beside - BEYOND_RIM);
         }
-        Some(Height { value: if up < 0.0 { -hit.distance } else { hit.distance }, point: hit.point, normal })
+        Place::Over(Height { value: if up < 0.0 { -hit.distance } else { hit.distance }, hit, normal })
+    }
+
+    /// Height of `p` over the surface, if it is within `reach` and not beyond the rim.
+    pub fn height(&self, p: &Point3<f32>, reach: f32) -> Option<f32> {
+        match self.place(p, reach) {
+            Place::Over(height) => Some(height.value),
+            _ => None,
+        }
     }
 
     /// The interpolated vertex normal in a triangle.
@@ -74,7 +104,7 @@ impl<'a> LowerSurface<'a> {
     }
 
     /// True where the closest point lies on an open side, or on a vertex of one.
-    pub fn on_rim(&self, hit: &Closest) -> bool {
+    fn on_rim(&self, hit: &Closest) -> bool {
         let (sides, w) = (self.open_sides[hit.triangle as usize], hit.barycentric);
         let corners = self.mesh.triangles[hit.triangle as usize];
         (0..3).any(|k| sides[k] && w[(k + 2) % 3] < ON_SIDE)
