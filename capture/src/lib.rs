@@ -3,6 +3,7 @@
 //! - [`Frame`]: depth and colour of one sensor at one time, with device and host time and the device's frame number;
 //! - [`Rig`] and [`Sensor`]: cameras, calibration, identity;
 //! - [`clock`]: which clock stamps frames, and its fit to the host's;
+//! - [`pairing`]: depth and colour of one time to one frame, for devices that send them apart;
 //! - [`Source`]: what live devices, replay and the synthetic sensor have in common;
 //! - [`Recorder`] writes frames to an MCAP file, [`Replay`] is the file as a source; [`depth_codec`] packs depth;
 //! - [`import`](mod@import) reads other people's folders; [`Subject`] is a person's folder with its takes;
@@ -55,6 +56,7 @@ pub mod garment_type;
 pub mod import;
 pub mod inspect;
 mod message;
+pub mod pairing;
 mod protobuf;
 pub mod recording;
 pub mod replay;

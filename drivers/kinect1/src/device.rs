@@ -7,6 +7,7 @@ use std::{
 
 use toile_capture::{
     CaptureError, ClockDomain, ClockFit, ColorImage, DepthImage, DeviceIdentity, Frame, RgbImage, Rig, Sensor, Source,
+    pairing::{Pair, Pairing},
 };
 use toile_driver_transport::{Bus, DeviceInfo, Transfer, TransferStatus, TransportError, UsbDevice};
 use toile_geometry::{Rigid, camera::PinholeCamera};
@@ -16,7 +17,6 @@ use crate::{
     assembler::{Assembler, Losses},
     commands::Commands,
     decode::{self, HEIGHT, INFRARED_HEIGHT, WIDTH, packed_size},
-    pairing::{Pair, Pairing},
     protocol::{PACKET_ROOM, Stream},
     registration::Registration,
 };

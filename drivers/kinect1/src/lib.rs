@@ -6,7 +6,7 @@
 //! 2. [`assembler`]: packets to whole frames; what is lost is counted, what is torn is dropped;
 //! 3. [`decode`]: packed depth, infrared and Bayer colours to images, pure;
 //! 4. [`calibration`]: the device's own numbers; raw depth to millimetres; [`registration`]: depth as colour sees it;
-//! 5. [`pairing`]: depth and colour of one time to one frame;
+//! 5. [`toile_capture::pairing`]: depth and colour of one time to one frame;
 //! 6. [`device`]: [`Kinect1`], the [`toile_capture::Source`] over it all; [`motor`]: LED, tilt, accelerometer.
 //!
 //! Protocol facts were learnt from libfreenect (<https://github.com/OpenKinect/libfreenect>), the OpenKinect wiki and
@@ -33,7 +33,7 @@ pub mod decode;
 pub mod device;
 pub mod error;
 pub mod motor;
-pub mod pairing;
+
 pub mod protocol;
 pub mod registration;
 

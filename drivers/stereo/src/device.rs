@@ -4,6 +4,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 use toile_capture::{CaptureError, ColorImage, DeviceIdentity, Frame, Rig, Sensor, Source};
+use toile_driver_transport::video::Video;
 use toile_geometry::Rigid;
 use toile_stereo::{DepthFromPair, DepthSettings, StereoCalibration, read_calibration, rectify};
 
@@ -11,7 +12,7 @@ use crate::{
     StereoDriverError,
     pairing::{Moment, Picture, Side},
     pairs::{Pairs, SideBySide, TwoCameras},
-    stream::{FolderPictures, V4l2Pictures},
+    stream::{FolderPictures, NodePictures},
 };
 
 /// Where the pictures come from.
@@ -87,20 +88,20 @@ pub struct StereoCamera {
 }
 
 impl StereoCamera {
-    /// Opens the rig that `settings` describe.
+    /// Opens the rig that `settings` describe, its cameras among the nodes of `video`.
     ///
     /// # Errors
     /// [`StereoDriverError`] names the node, file or setting.
-    pub fn open(settings: &StereoSettings) -> Result<Self, StereoDriverError> {
+    pub fn open(video: &dyn Video, settings: &StereoSettings) -> Result<Self, StereoDriverError> {
         let calibration = read_calibration(&settings.calibration, settings.metres_per_unit)?;
         let StereoSettings { width, height, fps, .. } = *settings;
         let pairs: Box<dyn Pairs> = match &settings.cameras {
             Cameras::SideBySide { node } => {
-                Box::new(SideBySide::new(V4l2Pictures::open(node, Side::Left, 2 * width, height)?))
+                Box::new(SideBySide::new(NodePictures::open(video, node, Side::Left, (2 * width, height))?))
             }
             Cameras::Two { left, right } => Box::new(TwoCameras::new(
-                V4l2Pictures::open(left, Side::Left, width, height)?,
-                V4l2Pictures::open(right, Side::Right, width, height)?,
+                NodePictures::open(video, left, Side::Left, (width, height))?,
+                NodePictures::open(video, right, Side::Right, (width, height))?,
                 fps,
             )),
             Cameras::Folder { path } => Box::new(TwoCameras::new(

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use toile_driver_transport::TransportError;
 use toile_stereo::StereoError;
 
 use crate::pairing::Side;
@@ -10,15 +11,8 @@ use crate::pairing::Side;
 #[derive(Debug, thiserror::Error)]
 pub enum StereoDriverError {
     /// A node could not be opened or driven.
-    #[error("{node}: cannot {action}: {source}")]
-    Device {
-        /// Device node.
-        node: PathBuf,
-        /// What was tried.
-        action: &'static str,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Transport(#[from] TransportError),
     /// The camera offers no picture format that is understood.
     #[error("{node}: offers {offered} at {width}x{height}, but pictures must be MJPG, YUYV or GREY of that size")]
     Format {

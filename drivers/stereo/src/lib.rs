@@ -1,6 +1,6 @@
 //! Stereo rigs as depth cameras: one side-by-side camera, two cameras paired by time, or recorded pairs.
 //!
-//! - [`stream`]: pictures of one camera from V4L2 or from a folder; [`decode`]: their bytes, pure;
+//! - [`stream`]: pictures of one camera from a video node or from a folder; [`decode`]: their bytes, pure;
 //! - [`pairing`]: two streams to pairs by time, pure; [`pairs`]: side by side, two cameras, two sensors of a recording;
 //! - [`device`]: the [`toile_capture::Source`] over it all. Matching itself is `toile_stereo`'s.
 //!
@@ -8,7 +8,8 @@
 //! use toile_capture::Source;
 //! use toile_driver_stereo::{Cameras, StereoCamera, StereoSettings};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let mut camera = StereoCamera::open(&StereoSettings {
+//! # use toile_driver_transport::video::kernel::KernelVideo;
+//! let settings = StereoSettings {
 //!     name: "front".into(),
 //!     cameras: Cameras::SideBySide { node: "/dev/video0".into() },
 //!     width: 640,
@@ -18,7 +19,8 @@
 //!     metres_per_unit: 0.001,
 //!     alpha: 0.0,
 //!     depth: Default::default(),
-//! })?;
+//! };
+//! let mut camera = StereoCamera::open(&KernelVideo::default(), &settings)?;
 //! while let Some(frame) = camera.next_frame()? {
 //!     assert!(frame.color.is_some());
 //! }
@@ -37,4 +39,4 @@ pub use device::{Cameras, PairCounts, StereoCamera, StereoSettings};
 pub use error::StereoDriverError;
 pub use pairing::{Moment, Picture, Side};
 pub use pairs::{Pairs, SideBySide, TwoCameras, TwoSensors};
-pub use stream::{FolderPictures, Pictures, V4l2Pictures};
+pub use stream::{FolderPictures, NodePictures, Pictures};

@@ -1,4 +1,4 @@
-//! Pictures from one camera: a V4L2 node, a folder, or a stand-in.
+//! Pictures from one camera: a video node, a folder, or a stand-in.
 
 use std::{
     path::{Path, PathBuf},
@@ -6,11 +6,9 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use v4l::{
-    Device, FourCC,
-    buffer::Type,
-    io::{mmap::Stream, traits::CaptureStream},
-    video::Capture,
+use toile_driver_transport::{
+    TransportError,
+    video::{FourCc, Video, VideoNode},
 };
 
 use crate::{
@@ -34,73 +32,65 @@ pub trait Pictures: Send {
 }
 
 /// Buffers that the kernel may fill ahead of us.
-const BUFFERS: u32 = 4;
+const BUFFERS: u32 = 8;
 
 /// How long to wait for a picture before the camera is taken for stuck.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// `ENODEV` of Linux (asm-generic/errno-base.h): what an unplugged camera answers.
-const NO_SUCH_DEVICE: i32 = 19;
-
 /// Formats in the order they are asked for: JPEG first, because two cameras share a bus.
-const FORMATS: [(PixelFormat, &[u8; 4]); 3] =
-    [(PixelFormat::Mjpg, b"MJPG"), (PixelFormat::Yuyv, b"YUYV"), (PixelFormat::Grey, b"GREY")];
+const FORMATS: [(PixelFormat, FourCc); 3] =
+    [(PixelFormat::Mjpg, FourCc::MJPG), (PixelFormat::Yuyv, FourCc::YUYV), (PixelFormat::Grey, FourCc::GREY)];
 
-/// A V4L2 node that streams pictures into mapped memory.
-pub struct V4l2Pictures {
-    node: PathBuf,
+/// The pictures of a video node.
+pub struct NodePictures {
+    node: Box<dyn VideoNode>,
     side: Side,
-    stream: Stream<'static>,
     layout: Layout,
 }
 
-impl V4l2Pictures {
+impl NodePictures {
     /// Opens `node`, asks for pictures of a size, and starts streaming.
     ///
     /// # Errors
-    /// [`StereoDriverError::Device`] where a call fails, [`StereoDriverError::Format`] where the node has no such pictures.
-    pub fn open(node: &Path, side: Side, width: u32, height: u32) -> Result<Self, StereoDriverError> {
-        let failed = |action| move |source| StereoDriverError::Device { node: node.to_path_buf(), action, source };
+    /// [`StereoDriverError::Transport`] where a call fails, [`StereoDriverError::Format`] where the node has no such
+    /// pictures.
+    pub fn open(
+        video: &dyn Video,
+        node: &Path,
+        side: Side,
+        (width, height): (u32, u32),
+    ) -> Result<Self, StereoDriverError> {
         let format = |offered: String| StereoDriverError::Format { node: node.to_path_buf(), offered, width, height };
-        let device = Device::with_path(node).map_err(failed("open it"))?;
-        let offered: Vec<FourCC> =
-            device.enum_formats().map_err(failed("list its formats"))?.iter().map(|f| f.fourcc).collect();
+        let mut opened = video.open(node)?;
+        let offered = opened.formats()?;
         let (chosen, code) = FORMATS
             .into_iter()
-            .find(|(_, code)| offered.contains(&FourCC::new(code)))
+            .find(|(_, code)| offered.contains(code))
             .ok_or_else(|| format(offered.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")))?;
-        let asked = v4l::Format::new(width, height, FourCC::new(code));
-        let given = device.set_format(&asked).map_err(failed("set its format"))?;
-        if (given.width, given.height, given.fourcc) != (width, height, asked.fourcc) {
-            return Err(format(format!("{} {}x{}", given.fourcc, given.width, given.height)));
+        let given = opened.set_format(code, width, height)?;
+        if (given.width, given.height, given.format) != (width, height, code) {
+            return Err(format(format!("{} {}x{}", given.format, given.width, given.height)));
         }
-        let mut stream =
-            Stream::with_buffers(&device, Type::VideoCapture, BUFFERS).map_err(failed("start streaming"))?;
-        stream.set_timeout(TIMEOUT);
+        opened.start(BUFFERS)?;
         let layout = Layout { format: chosen, width, height, stride: given.stride };
-        Ok(Self { node: node.to_path_buf(), side, stream, layout })
+        Ok(Self { node: opened, side, layout })
     }
 }
 
-impl Pictures for V4l2Pictures {
+impl Pictures for NodePictures {
     fn next_picture(&mut self) -> Result<Option<Picture>, StereoDriverError> {
-        let (bytes, meta) = match self.stream.next() {
-            Ok(buffer) => buffer,
+        let buffer = match self.node.next_buffer(TIMEOUT) {
             // An unplugged camera ends the take; it does not fail it.
-            Err(error) if error.raw_os_error() == Some(NO_SUCH_DEVICE) => return Ok(None),
-            Err(source) => {
-                return Err(StereoDriverError::Device { node: self.node.clone(), action: "read a picture", source });
-            }
+            Err(TransportError::Unplugged) => return Ok(None),
+            other => other?,
         };
-        let used = bytes.len().min(meta.bytesused as usize);
-        let sequence = u64::from(meta.sequence);
-        let image = decode::picture(&bytes[..used], self.layout).map_err(|reason| StereoDriverError::Picture {
+        let sequence = u64::from(buffer.sequence);
+        let image = decode::picture(&buffer.bytes, self.layout).map_err(|reason| StereoDriverError::Picture {
             side: self.side,
             sequence,
             reason,
         })?;
-        let time_ns = meta.timestamp.sec * 1_000_000_000 + meta.timestamp.usec * 1000;
-        Ok(Some(Picture { image: Arc::new(image), sequence, time_ns, host_time_ns: host_time_ns() }))
+        Ok(Some(Picture { image: Arc::new(image), sequence, time_ns: buffer.time_ns, host_time_ns: host_time_ns() }))
     }
 
     fn is_live(&self) -> bool {
@@ -168,12 +158,6 @@ impl Pictures for FolderPictures {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_node_that_is_not_there_is_named() {
-        let error = V4l2Pictures::open(Path::new("/dev/video-none"), Side::Left, 640, 480).err().map(|e| e.to_string());
-        assert!(error.is_some_and(|e| e.contains("/dev/video-none") && e.contains("open it")));
-    }
 
     #[test]
     fn names_give_numbers() {

@@ -11,6 +11,7 @@ use toile_driver_stereo::{
     Cameras, PairCounts, Pairs, Picture, Pictures, Side, SideBySide, StereoCamera, StereoDriverError, StereoSettings,
     TwoCameras, TwoSensors,
 };
+use toile_driver_transport::{twin::VirtualBus, video::twin::VirtualVideo};
 use toile_stereo::DepthSettings;
 
 /// Nanoseconds a frame.
@@ -192,7 +193,7 @@ fn folders_of_pictures_and_recordings_of_two_sensors_are_rigs_too() {
     std::fs::write(&calibration, calibration_text()).unwrap();
     let cameras = Cameras::Folder { path: folder.path().into() };
     let chosen = StereoSettings { cameras, calibration: vec![calibration], ..settings() };
-    let mut rig = StereoCamera::open(&chosen).unwrap();
+    let mut rig = StereoCamera::open(&VirtualVideo::new(VirtualBus::default()), &chosen).unwrap();
     let from_folder = [rig.next_frame().unwrap().unwrap(), rig.next_frame().unwrap().unwrap()];
     assert!(from_folder.iter().all(|f| f.depth.is_some()));
     let error = rig.next_frame().unwrap_err().to_string();

@@ -53,6 +53,24 @@ pub enum TransportError {
         /// What was asked.
         what: String,
     },
+    /// This user may not open the video node.
+    #[error("{node}: no permission to open it. {advice}")]
+    NodePermission {
+        /// Device node.
+        node: std::path::PathBuf,
+        /// What to do.
+        advice: String,
+    },
+    /// A video node could not be opened or driven.
+    #[error("{node}: cannot {action}: {source}")]
+    Video {
+        /// Device node.
+        node: std::path::PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// Anything else that libusb reports.
     #[error("{what}: {source}")]
     Failed {

@@ -1,80 +1,164 @@
 //! The camera as a source of frames.
 
-use std::{path::Path, sync::Arc, time::SystemTime};
-
-use toile_capture::{CaptureError, Frame, Rig, Sensor, Source};
-
-use crate::{
-    UvcDepthError, calibration, decode,
-    stream::{Buffers, V4l2Buffers},
+use std::{
+    path::Path,
+    sync::Arc,
+    time::{Duration, SystemTime},
 };
 
-/// A UVC depth camera: depth only, intrinsics from a file.
-pub struct UvcDepthCamera<B: Buffers> {
-    buffers: B,
-    rig: Rig,
-    next_index: u64,
-    last_sequence: Option<u32>,
+use toile_capture::{CaptureError, Frame, Rig, Source};
+use toile_driver_transport::{
+    TransportError,
+    video::{Video, VideoBuffer, VideoNode},
+};
+
+use crate::{UvcDepthError, calibration, decode, decode::Layout, nodes::depth_format};
+
+/// How to stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Buffers that the kernel may fill ahead of us. Default 8: a quarter of a second.
+    pub buffers: u32,
+    /// After so long without a frame the stream is switched off and on once; after as long again that is an error.
+    /// Default 2 s.
+    pub frame_limit: Duration,
 }
 
-impl UvcDepthCamera<V4l2Buffers> {
-    /// Opens the camera at `node` (such as `/dev/video2`) with the intrinsics of `calibration_file`.
+impl Default for Settings {
+    fn default() -> Self {
+        Self { buffers: 8, frame_limit: Duration::from_secs(2) }
+    }
+}
+
+/// How well it went so far.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Health {
+    /// Frames given.
+    pub frames: u64,
+    /// Frames that the driver lost or kept to itself because they were damaged.
+    pub lost: u64,
+    /// Frames that came and could not be read.
+    pub broken: u64,
+    /// How often the stream was switched off and on.
+    pub restarts: u32,
+}
+
+/// A UVC depth camera: depth only, intrinsics from a file.
+///
+/// After an unplug or a silence there is one error, then the end.
+pub struct UvcDepthCamera {
+    node: Box<dyn VideoNode>,
+    layout: Layout,
+    settings: Settings,
+    rig: Rig,
+    health: Health,
+    last_sequence: Option<u32>,
+    /// No frame came since the stream was switched off and on.
+    is_last_try: bool,
+    ended: bool,
+}
+
+impl UvcDepthCamera {
+    /// Opens the camera at `node` (such as `/dev/video2`) with the intrinsics of `calibration_file`, and starts it.
     ///
     /// # Errors
     /// [`UvcDepthError`] where the file or the node cannot be used.
-    pub fn open(node: &Path, calibration_file: &Path) -> Result<Self, UvcDepthError> {
+    pub fn open(
+        video: &dyn Video,
+        node: &Path,
+        calibration_file: &Path,
+        settings: Settings,
+    ) -> Result<Self, UvcDepthError> {
         let sensor = calibration::read(calibration_file)?;
-        let buffers = V4l2Buffers::open(node, sensor.depth.width, sensor.depth.height)?;
-        let given = buffers.layout();
-        if (given.width, given.height) != (sensor.depth.width, sensor.depth.height) {
-            return Err(UvcDepthError::Calibration {
-                path: calibration_file.to_path_buf(),
-                reason: format!(
-                    "it describes {}x{} but the camera streams {}x{}",
-                    sensor.depth.width, sensor.depth.height, given.width, given.height
-                ),
-            });
+        let (width, height) = (sensor.depth.width, sensor.depth.height);
+        let mut opened = video.open(node)?;
+        let offered = opened.formats()?;
+        let format = depth_format(&offered).ok_or_else(|| UvcDepthError::Format {
+            node: node.to_path_buf(),
+            offered: offered.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
+        })?;
+        let given = opened.set_format(format, width, height)?;
+        if (given.format, given.width, given.height) != (format, width, height) {
+            let what = format!(
+                "it describes {width}x{height} but the camera streams {} {}x{}",
+                given.format, given.width, given.height
+            );
+            return Err(UvcDepthError::Calibration { path: calibration_file.to_path_buf(), reason: what });
         }
-        Ok(Self::new(buffers, sensor))
-    }
-}
-
-impl<B: Buffers> UvcDepthCamera<B> {
-    /// A camera over any stream of buffers.
-    pub fn new(buffers: B, sensor: Sensor) -> Self {
-        Self { buffers, rig: Rig { sensors: vec![sensor] }, next_index: 0, last_sequence: None }
-    }
-
-    fn device_error(&self, reason: String) -> CaptureError {
-        CaptureError::Device { device: self.rig.sensors[0].name.clone(), reason }
-    }
-}
-
-impl<B: Buffers> Source for UvcDepthCamera<B> {
-    fn rig(&self) -> &Rig {
-        &self.rig
+        opened.start(settings.buffers)?;
+        Ok(Self {
+            node: opened,
+            layout: Layout { width, height, stride: given.stride },
+            settings,
+            rig: Rig { sensors: vec![sensor] },
+            health: Health::default(),
+            last_sequence: None,
+            is_last_try: false,
+            ended: false,
+        })
     }
 
-    fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
-        let Some(buffer) = self.buffers.next_buffer().map_err(|e| self.device_error(e.to_string()))? else {
-            return Ok(None);
-        };
+    /// How well it went so far.
+    pub fn health(&self) -> Health {
+        self.health
+    }
+
+    /// The next buffer; after a silence once more from the start.
+    fn next_buffer(&mut self) -> Result<VideoBuffer, UvcDepthError> {
+        loop {
+            match self.node.next_buffer(self.settings.frame_limit) {
+                Err(TransportError::TimedOut { .. }) if self.is_last_try => {
+                    return Err(UvcDepthError::Silent(self.settings.frame_limit.as_secs_f64()));
+                }
+                Err(TransportError::TimedOut { .. }) => {
+                    (self.is_last_try, self.last_sequence) = (true, None);
+                    self.health.restarts += 1;
+                    self.node.stop();
+                    self.node.start(self.settings.buffers)?;
+                }
+                other => return Ok(other?),
+            }
+        }
+    }
+
+    fn frame(&mut self, buffer: &VideoBuffer) -> Result<Frame, UvcDepthError> {
         // The kernel's counter is 32 bits wide and wraps; the difference does not mind.
         let lost = self.last_sequence.map_or(0, |last| buffer.sequence.wrapping_sub(last).wrapping_sub(1));
         self.last_sequence = Some(buffer.sequence);
-        let depth = decode::depth16(&buffer.bytes, self.buffers.layout())
-            .map_err(|e| CaptureError::Frame { index: self.next_index, reason: e.to_string() })?;
-        let frame = Frame {
+        self.health.lost += u64::from(lost);
+        self.is_last_try = false;
+        let depth = decode::depth16(&buffer.bytes, self.layout)?;
+        self.health.frames += 1;
+        Ok(Frame {
             sensor: 0,
-            index: self.next_index,
+            index: self.health.frames - 1,
             device_frame: u64::from(buffer.sequence),
             lost_before: lost,
             device_time_ns: buffer.time_ns,
             host_time_ns: host_time_ns(),
             depth: Some(Arc::new(depth)),
             color: None,
-        };
-        self.next_index += 1;
+        })
+    }
+}
+
+impl Source for UvcDepthCamera {
+    fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
+        if self.ended {
+            return Ok(None);
+        }
+        let buffer = self.next_buffer().map_err(|error| {
+            self.ended = true;
+            CaptureError::Device { device: self.rig.sensors[0].name.clone(), reason: error.to_string() }
+        })?;
+        let frame = self.frame(&buffer).map_err(|error| {
+            self.health.broken += 1;
+            CaptureError::Frame { index: self.health.frames, reason: error.to_string() }
+        })?;
         Ok(Some(frame))
     }
 }
@@ -82,59 +166,4 @@ impl<B: Buffers> Source for UvcDepthCamera<B> {
 fn host_time_ns() -> i64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
-}
-
-#[cfg(test)]
-mod tests {
-    use toile_capture::DeviceIdentity;
-    use toile_geometry::{Rigid, camera::PinholeCamera};
-
-    use super::*;
-    use crate::{decode::Layout, stream::Buffer};
-
-    struct Script(Vec<Buffer>);
-
-    impl Buffers for Script {
-        fn layout(&self) -> Layout {
-            Layout { width: 2, height: 1, stride: 4 }
-        }
-        fn next_buffer(&mut self) -> std::io::Result<Option<Buffer>> {
-            Ok((!self.0.is_empty()).then(|| self.0.remove(0)))
-        }
-    }
-
-    fn sensor() -> Sensor {
-        Sensor {
-            name: "scripted".into(),
-            identity: DeviceIdentity::default(),
-            depth: PinholeCamera::ideal(2, 1, 1.0, 1.0, 0.5, 0.0),
-            depth_scale: 0.001,
-            color: None,
-            color_from_depth: Rigid::identity(),
-            rig_from_depth: Rigid::identity(),
-            fps: 30.0,
-        }
-    }
-
-    fn buffer(sequence: u32, bytes: &[u8]) -> Buffer {
-        Buffer { bytes: bytes.to_vec(), sequence, time_ns: i64::from(sequence) * 33_000_000 }
-    }
-
-    #[test]
-    fn losses_are_counted_across_the_wrap_and_the_end_is_clean() {
-        let whole = [1, 0, 2, 0];
-        let script = Script(vec![buffer(u32::MAX - 1, &whole), buffer(u32::MAX, &whole), buffer(2, &whole)]);
-        let mut camera = UvcDepthCamera::new(script, sensor());
-        let lost: Vec<u32> = std::iter::from_fn(|| camera.next_frame().unwrap()).map(|f| f.lost_before).collect();
-        assert_eq!(lost, vec![0, 0, 2]);
-    }
-
-    #[test]
-    fn a_short_buffer_is_an_error_and_the_next_one_goes_on() {
-        let script = Script(vec![buffer(0, &[1, 0, 2]), buffer(1, &[1, 0, 2, 0])]);
-        let mut camera = UvcDepthCamera::new(script, sensor());
-        assert!(camera.next_frame().unwrap_err().to_string().contains("3 bytes"));
-        let frame = camera.next_frame().unwrap().unwrap();
-        assert_eq!(frame.depth.unwrap().values, vec![1, 2]);
-    }
 }

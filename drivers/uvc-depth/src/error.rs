@@ -2,19 +2,17 @@
 
 use std::path::PathBuf;
 
+use toile_driver_transport::TransportError;
+
 /// Errors of the UVC depth driver.
 #[derive(Debug, thiserror::Error)]
 pub enum UvcDepthError {
     /// The node could not be opened or driven.
-    #[error("{node}: cannot {action}: {source}")]
-    Device {
-        /// Device node.
-        node: PathBuf,
-        /// What was tried.
-        action: &'static str,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// No frame came although the stream is on.
+    #[error("no frame for {0:.1} s; check its cable, and that nothing else on its USB controller streams")]
+    Silent(f64),
     /// The camera offers no depth format.
     #[error(
         "{node}: offers {offered}, but depth needs Z16 or Y16; choose the camera's depth node with `toile devices`"

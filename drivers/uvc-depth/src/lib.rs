@@ -1,15 +1,15 @@
-//! Depth cameras that speak UVC (Z16, Y16) through V4L2.
+//! Depth cameras that speak UVC (Z16, Y16) through video nodes.
 //!
+//! - [`nodes`]: which nodes offer depth;
 //! - [`decode`]: buffer bytes to a depth image, pure;
 //! - [`calibration`]: the intrinsics file that such cameras need, since UVC does not carry any;
-//! - [`stream`]: buffers from a V4L2 node (or from anything else that yields buffers);
 //! - [`device`]: the [`toile_capture::Source`] over it all.
 
 pub mod calibration;
 pub mod decode;
 pub mod device;
 pub mod error;
-pub mod stream;
+pub mod nodes;
 
-pub use device::UvcDepthCamera;
+pub use device::{Health, Settings, UvcDepthCamera};
 pub use error::UvcDepthError;

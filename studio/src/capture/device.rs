@@ -5,8 +5,8 @@ use std::{path::PathBuf, str::FromStr};
 use toile_capture::{Layer, Replay, Source, Subject};
 use toile_driver_kinect1::{Kinect1, Settings};
 use toile_driver_synthetic::SyntheticDevice;
-use toile_driver_transport::libusb::LibusbBus;
-use toile_driver_uvc_depth::UvcDepthCamera;
+use toile_driver_transport::{libusb::LibusbBus, video::kernel::KernelVideo};
+use toile_driver_uvc_depth::{self as uvc_depth, UvcDepthCamera};
 use toile_synthetic::{GarmentKind, GarmentSettings, SyntheticSettings};
 
 use crate::StudioError;
@@ -82,7 +82,8 @@ impl Device {
                 Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
             }
             Self::Uvc(node, calibration) => {
-                let opened = UvcDepthCamera::open(node, calibration);
+                let opened =
+                    UvcDepthCamera::open(&KernelVideo::default(), node, calibration, uvc_depth::Settings::default());
                 Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
             }
         }

@@ -6,8 +6,9 @@ use serde_json::{Value, json};
 use toile_driver_transport::{
     udev,
     usb::{self, UsbCamera},
+    video::kernel::KernelVideo,
 };
-use toile_driver_uvc_depth::stream;
+use toile_driver_uvc_depth::nodes::{self, DepthNode};
 use toile_driver_webcam as webcam;
 
 use crate::{StudioError, outcome::Answer, run::Session};
@@ -49,7 +50,7 @@ fn install() -> Result<Answer, StudioError> {
 fn list() -> Answer {
     let mut answer = Answer::default();
     let usb = usb::list().unwrap_or_else(|e| warn(&mut answer, &e));
-    let nodes = stream::list();
+    let nodes = nodes::list(&KernelVideo::default());
     let webcams = webcam::list().unwrap_or_else(|e| warn(&mut answer, &e));
     answer.text = text(&usb, &nodes, &webcams);
     for camera in &usb {
@@ -68,7 +69,7 @@ fn warn<T>(answer: &mut Answer, error: &dyn std::fmt::Display) -> Vec<T> {
     Vec::new()
 }
 
-fn text(usb: &[UsbCamera], nodes: &[stream::DepthNode], webcams: &[(u32, String)]) -> String {
+fn text(usb: &[UsbCamera], nodes: &[DepthNode], webcams: &[(u32, String)]) -> String {
     let mut lines: Vec<String> = usb
         .iter()
         .map(|c| format!("usb {:03}:{:03}  {} ({:?} speed)", c.address.0, c.address.1, c.name, c.speed))

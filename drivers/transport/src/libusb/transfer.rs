@@ -1,4 +1,4 @@
-//! Transfers in flight: the only unsafe code of the project.
+//! Transfers in flight; with `video/` the only unsafe code of the project.
 //!
 //! Invariants that the SAFETY lines name:
 //!

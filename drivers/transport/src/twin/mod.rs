@@ -10,14 +10,17 @@
 pub mod device;
 pub mod model;
 
-use std::sync::{
-    Arc, Mutex, MutexGuard, PoisonError,
-    atomic::{AtomicBool, Ordering},
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
 };
 
 pub use model::{Answer, DeviceModel, ModelInfo, Packet};
 
-use crate::{Bus, DeviceInfo, TransportError, UsbDevice};
+use crate::{Bus, DeviceInfo, TransportError, UsbDevice, video::twin::Flow};
 use device::TwinDevice;
 
 /// A model that is plugged in.
@@ -27,9 +30,28 @@ pub(crate) struct Plugged {
     pub(crate) model: Arc<Mutex<dyn DeviceModel>>,
     pub(crate) here: Arc<AtomicBool>,
     pub(crate) open: Arc<AtomicBool>,
+    /// Bus time of its video streams, microframes.
+    clock: Arc<AtomicU64>,
+    /// Video streams by their interfaces.
+    flows: Arc<Mutex<BTreeMap<u8, Arc<Mutex<Flow>>>>>,
 }
 
 impl Plugged {
+    /// The latest microframe of its video streams.
+    pub(crate) fn clock(&self) -> u64 {
+        self.clock.load(Ordering::Acquire)
+    }
+
+    pub(crate) fn advance(&self, microframe: u64) {
+        self.clock.fetch_max(microframe, Ordering::AcqRel);
+    }
+
+    /// What the nodes of a streaming interface share.
+    pub(crate) fn flow(&self, interface: u8) -> Arc<Mutex<Flow>> {
+        let mut flows = self.flows.lock().unwrap_or_else(PoisonError::into_inner);
+        flows.entry(interface).or_default().clone()
+    }
+
     pub(crate) fn model(&self) -> MutexGuard<'_, dyn DeviceModel + 'static> {
         self.model.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -60,7 +82,8 @@ impl VirtualBus {
             speed: about.speed,
         };
         let (here, open) = (Arc::new(AtomicBool::new(true)), Arc::new(AtomicBool::new(false)));
-        ports.plugged.push(Plugged { info: info.clone(), model, here, open });
+        let (clock, flows) = (Arc::default(), Arc::default());
+        ports.plugged.push(Plugged { info: info.clone(), model, here, open, clock, flows });
         info
     }
 
@@ -71,6 +94,14 @@ impl VirtualBus {
         ports.plugged.retain(|p| p.info != *info);
     }
 
+    /// What is plugged in now.
+    pub(crate) fn plugged(&self) -> Vec<Plugged> {
+        let mut ports = self.ports();
+        // A model that unplugged itself is off the bus.
+        ports.plugged.retain(|p| p.here.load(Ordering::Acquire));
+        ports.plugged.clone()
+    }
+
     fn ports(&self) -> MutexGuard<'_, Ports> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -78,10 +109,7 @@ impl VirtualBus {
 
 impl Bus for VirtualBus {
     fn list(&self) -> Result<Vec<DeviceInfo>, TransportError> {
-        let mut ports = self.ports();
-        // A model that unplugged itself is off the bus.
-        ports.plugged.retain(|p| p.here.load(Ordering::Acquire));
-        Ok(ports.plugged.iter().map(|p| p.info.clone()).collect())
+        Ok(self.plugged().into_iter().map(|p| p.info).collect())
     }
 
     fn open(&self, info: &DeviceInfo) -> Result<Box<dyn UsbDevice>, TransportError> {

@@ -1,0 +1,192 @@
+//! Video nodes: what a program sees of cameras that a kernel driver serves (V4L2 over UVC).
+//!
+//! - [`Video`] lists and opens nodes; [`VideoNode`] is an open one: formats, buffers with a time limit, controls and the
+//!   UVC extension units of its camera; metadata nodes are nodes too;
+//! - [`kernel::KernelVideo`]: both over V4L2 (through `v4l`); [`sysfs`]: which USB device a node belongs to;
+//! - [`twin::VirtualVideo`]: both in this process, over the device models of a [`crate::twin::VirtualBus`];
+//!   [`uvc`]: what the kernel's driver does with descriptors and payloads, for the twin.
+
+pub mod kernel;
+mod mapped;
+pub mod sysfs;
+pub mod twin;
+pub mod uvc;
+
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use serde::Serialize;
+
+use crate::{LinkSpeed, TransportError};
+
+/// Code of a pixel format (`linux/videodev2.h`).
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct FourCc(pub [u8; 4]);
+
+impl FourCc {
+    /// Depth, 16 bits (V4L2_PIX_FMT_Z16).
+    pub const Z16: Self = Self(*b"Z16 ");
+    /// Grey, 16 bits (V4L2_PIX_FMT_Y16).
+    pub const Y16: Self = Self(*b"Y16 ");
+    /// Grey, 8 bits (V4L2_PIX_FMT_GREY).
+    pub const GREY: Self = Self(*b"GREY");
+    /// Grey of two cameras, 8 bits each, left and right in turn (V4L2_PIX_FMT_Y8I).
+    pub const Y8I: Self = Self(*b"Y8I ");
+    /// Brightness of every pixel, colour of every second (V4L2_PIX_FMT_YUYV).
+    pub const YUYV: Self = Self(*b"YUYV");
+    /// A JPEG a picture (V4L2_PIX_FMT_MJPEG).
+    pub const MJPG: Self = Self(*b"MJPG");
+    /// Standard header of UVC payloads (V4L2_META_FMT_UVC).
+    pub const UVC_HEADER: Self = Self(*b"UVCH");
+    /// Whole header of UVC payloads as RealSense cameras send it (V4L2_META_FMT_D4XX).
+    pub const D4XX: Self = Self(*b"D4XX");
+}
+
+impl fmt::Display for FourCc {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", String::from_utf8_lossy(&self.0).trim_end())
+    }
+}
+
+impl fmt::Debug for FourCc {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// The USB interface behind a node.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct UsbPlace {
+    /// Vendor and product id.
+    pub id: (u16, u16),
+    /// Bus and address.
+    pub address: (u8, u8),
+    /// Speed of its link.
+    pub speed: LinkSpeed,
+    /// Number of the interface that controls the camera; nodes of one camera part share it.
+    pub interface: u8,
+    /// Serial number of the USB device; empty where it has none.
+    pub serial: String,
+}
+
+/// A node, known without opening it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct NodeInfo {
+    /// Such as `/dev/video2`.
+    pub node: PathBuf,
+    /// What the driver calls the camera.
+    pub name: String,
+    /// Where it is on USB; `None` for other cameras.
+    pub usb: Option<UsbPlace>,
+}
+
+/// How a node's pictures are laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PictureLayout {
+    /// What they hold.
+    pub format: FourCc,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Bytes from one row to the next; 0 where there are no rows (JPEG, metadata).
+    pub stride: u32,
+}
+
+/// What the driver filled.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct VideoBuffer {
+    /// The picture, or metadata.
+    pub bytes: Vec<u8>,
+    /// The driver's number; those left out were lost.
+    pub sequence: u32,
+    /// The host's monotonic clock at the picture's first byte, nanoseconds.
+    pub time_ns: i64,
+    /// The driver knows that bytes are missing.
+    pub is_damaged: bool,
+}
+
+/// All video nodes of a machine.
+pub trait Video: Send + Sync {
+    /// The nodes that are there now, in the order of their numbers.
+    ///
+    /// # Errors
+    /// [`TransportError::Video`] where the list cannot be read at all.
+    fn list(&self) -> Result<Vec<NodeInfo>, TransportError>;
+
+    /// Opens a node.
+    ///
+    /// # Errors
+    /// [`TransportError::NodePermission`], [`TransportError::Video`].
+    fn open(&self, node: &Path) -> Result<Box<dyn VideoNode>, TransportError>;
+}
+
+/// An open node. Dropping it stops it. After an unplug all calls fail with [`TransportError::Unplugged`].
+pub trait VideoNode: Send {
+    /// True where it carries metadata of another node's pictures instead of pictures.
+    fn is_metadata(&self) -> bool;
+
+    /// What the driver calls the camera.
+    fn name(&self) -> &str;
+
+    /// Formats on offer, in the driver's order; for metadata nodes none are told.
+    ///
+    /// # Errors
+    /// [`TransportError::Video`].
+    fn formats(&self) -> Result<Vec<FourCc>, TransportError>;
+
+    /// Asks for pictures of a kind and size (metadata nodes: the kind alone); returns what the driver gives, which may
+    /// be something else.
+    ///
+    /// # Errors
+    /// [`TransportError::Video`].
+    fn set_format(&mut self, format: FourCc, width: u32, height: u32) -> Result<PictureLayout, TransportError>;
+
+    /// Asks for so many pictures a second; returns what the driver gives.
+    ///
+    /// # Errors
+    /// [`TransportError::Video`].
+    fn set_rate(&mut self, fps: u32) -> Result<f64, TransportError>;
+
+    /// Starts streaming into so many buffers.
+    ///
+    /// # Errors
+    /// [`TransportError::Video`].
+    fn start(&mut self, buffers: u32) -> Result<(), TransportError>;
+
+    /// The next buffer that is full.
+    ///
+    /// # Errors
+    /// [`TransportError::TimedOut`] where none is in time (the stream goes on), [`TransportError::Video`].
+    fn next_buffer(&mut self, limit: Duration) -> Result<VideoBuffer, TransportError>;
+
+    /// Stops streaming; buffers that are full are given up.
+    fn stop(&mut self);
+
+    /// A control's value.
+    ///
+    /// # Errors
+    /// [`TransportError::Video`] where there is no such control.
+    fn control(&self, id: u32) -> Result<i64, TransportError>;
+
+    /// Sets a control.
+    ///
+    /// # Errors
+    /// As [`Self::control`].
+    fn set_control(&mut self, id: u32, value: i64) -> Result<(), TransportError>;
+
+    /// Reads `data.len()` bytes from an extension unit: what its selector has by the UVC request GET_LEN.
+    ///
+    /// # Errors
+    /// [`TransportError::Stalled`], [`TransportError::Video`].
+    fn extension_get(&mut self, unit: u8, selector: u8, data: &mut [u8]) -> Result<(), TransportError>;
+
+    /// Writes to an extension unit.
+    ///
+    /// # Errors
+    /// As [`Self::extension_get`].
+    fn extension_set(&mut self, unit: u8, selector: u8, data: &[u8]) -> Result<(), TransportError>;
+}
