@@ -13,7 +13,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = BodyModel::load_default()?;
     let scan = ply::read(Path::new(scan))?;
     let start = Instant::now();
-    let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {})?;
+    let fit =
+        fit_body(&model, &scan, &FitSettings::default(), &|p| println!("{:.2} s: {p}", start.elapsed().as_secs_f64()))?;
     println!("{:.2} s, {} triangles", start.elapsed().as_secs_f64(), scan.triangles.len());
     println!("{}", serde_json::to_string_pretty(&fit.report)?);
     println!("{:?}", fit.measurements);

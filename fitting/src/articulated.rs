@@ -137,18 +137,11 @@ impl Articulated {
         let frames = state.pose.joint_frames(&skeleton);
         let transforms = state.pose.skinning_transforms(&skeleton);
         let joint_shifts = self.joint_basis.iter().map(|column| joint_shifts(column, &frames)).collect();
-        let vertex = |v: usize| {
-            let shaped = self.shaped(v, &state.beta);
-            let (mut p, mut n) = (Vector3::zeros(), Vector3::zeros());
-            for (j, w) in self.weights.of(v) {
-                let t = &transforms[j as usize];
-                p += (t * shaped).coords * f64::from(w);
-                n += t.rotation * self.rest_normals[v].cast::<f64>() * f64::from(w);
-            }
-            let normal = n.try_normalize(1e-9).unwrap_or_default().cast::<f32>();
-            (shaped, Point3::from(p.cast::<f32>()), normal)
-        };
-        let all: Vec<_> = (0..self.len()).into_par_iter().with_min_len(256).map(vertex).collect();
+        let all: Vec<_> = (0..self.len())
+            .into_par_iter()
+            .with_min_len(256)
+            .map(|v| self.skinned(v, &state.beta, &transforms))
+            .collect();
         Posed {
             points: all.iter().map(|a| a.1).collect(),
             normals: all.iter().map(|a| a.2).collect(),
@@ -157,6 +150,39 @@ impl Articulated {
             frames,
             joint_shifts,
         }
+    }
+
+    /// Position, normal and area of the vertices `of` only.
+    pub fn pose_of(&self, state: &State, of: &[usize]) -> Vec<(Point3<f32>, Vector3<f32>, f32)> {
+        let transforms = state.pose.skinning_transforms(&self.skeleton_at(&state.beta));
+        let vertex = |v: usize| {
+            let (_, point, normal) = self.skinned(v, &state.beta, &transforms);
+            (point, normal, self.areas[v])
+        };
+        of.iter().map(|&v| vertex(v)).collect()
+    }
+
+    /// The joint that moves vertex `v` most.
+    pub fn main_joint(&self, v: usize) -> Joint {
+        Joint::from_index(usize::from(self.weights.joints[v][0])).unwrap_or(Joint::Hips)
+    }
+
+    /// Shaped rest position, posed position and normal of a vertex.
+    fn skinned(
+        &self,
+        v: usize,
+        beta: &[f64],
+        transforms: &[Isometry3<f64>],
+    ) -> (Point3<f64>, Point3<f32>, Vector3<f32>) {
+        let shaped = self.shaped(v, beta);
+        let (mut p, mut n) = (Vector3::zeros(), Vector3::zeros());
+        for (j, w) in self.weights.of(v) {
+            let t = &transforms[j as usize];
+            p += (t * shaped).coords * f64::from(w);
+            n += t.rotation * self.rest_normals[v].cast::<f64>() * f64::from(w);
+        }
+        let normal = n.try_normalize(1e-9).unwrap_or_default().cast::<f32>();
+        (shaped, Point3::from(p.cast::<f32>()), normal)
     }
 
     fn shaped(&self, v: usize, beta: &[f64]) -> Point3<f64> {

@@ -8,6 +8,7 @@
 //!
 //! A fit that should not be trusted is a result with a [`Verdict`]; having no answer is a [`FittingError`].
 
+mod arms;
 mod articulated;
 mod body_fit;
 mod cloud;

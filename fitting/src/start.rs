@@ -9,6 +9,7 @@ use toile_geometry::Mesh;
 
 use crate::{
     FittingError,
+    arms::found_arms,
     articulated::{Articulated, Columns, State},
     cloud::{Cloud, Samples},
     correspond::{Gate, matches},
@@ -62,8 +63,14 @@ pub(crate) fn starts(
     let prior = JointPrior::standing(&model.mean_skeleton);
     let mut refined: Vec<Start> = candidates
         .into_par_iter()
-        .map(|c| level.run(c.state.clone(), &prior).map(|r| refined(r, c.up)))
-        .collect::<Result<_, _>>()?;
+        .map(|c| {
+            let first = level.run(c.state, &prior)?;
+            let Some(state) = found_arms(&level, &first.state) else { return Ok(refined(first, c.up)) };
+            let mut again = level.run(state, &prior)?;
+            again.iterations += first.iterations;
+            Ok(refined(if again.matches.misfit < first.matches.misfit { again } else { first }, c.up))
+        })
+        .collect::<Result<_, FittingError>>()?;
     refined.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
     Ok(refined)
 }

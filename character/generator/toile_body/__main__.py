@@ -23,6 +23,7 @@ def main():
     ap.add_argument("--samples", type=int, default=2400, help="people to draw, held-out ones included")
     ap.add_argument("--wide", type=float, default=0.3, help="share of people drawn wider than ANSUR II")
     ap.add_argument("--seed", type=int, default=2017)
+    ap.set_defaults(spread=population.LOCAL_SPREAD)
     ap.add_argument("--keep", help="also write samples and settings to this .pkl, for look.py")
     a = ap.parse_args()
     if a.samples < HELD_OUT + FEWEST:
@@ -97,7 +98,7 @@ def draw(base, template, moments, a, log):
     slider_set = sliders.Sliders(base.names)
     shapes = population.Shapes(base, slider_set, rig.head_selector(base, template["table"]))
     rng = np.random.Generator(np.random.PCG64(a.seed))
-    people = population.draw(rng, a.samples, a.wide, moments, slider_set.local_names)
+    people = population.draw(rng, a.samples, a.wide, moments, slider_set.local_names, a.spread)
     log(f"{a.samples} people drawn, {len(slider_set.local_names)} local sliders")
     return people, shapes, population.solve(shapes, tape, people, log=log)
 

@@ -38,15 +38,15 @@ class People:
     wide: np.ndarray  # True in the wide stratum
 
 
-def draw(rng, count, wide_share, moments, local_names):
+def draw(rng, count, wide_share, moments, local_names, spread=LOCAL_SPREAD):
     """Random people: sex alternates, ages 18 to 80, goals from ANSUR II's log-normal, wider in the wide stratum."""
     male = np.arange(count) % 2 == 0
     wide = rng.random(count) < wide_share
     goal = np.array([draw_goal(rng, moments["male" if m else "female"], w) for m, w in zip(male, wide)])
-    spread = rng.uniform(0, 0.15, count)
+    mixed = rng.uniform(0, 0.15, count)
     clip = lambda x: np.clip(x, 0.0, 1.0)
     macro = {
-        "gender": np.where(male, 1 - spread, spread),
+        "gender": np.where(male, 1 - mixed, mixed),
         "age": sl.age_from_years(rng.uniform(18, 80, count)),
         "soft": clip(rng.normal(0.4, 0.12, count)),
         "strong": clip(np.where(male, 0.35, 0.2) + rng.normal(0, 0.12, count)),
@@ -57,7 +57,7 @@ def draw(rng, count, wide_share, moments, local_names):
         "firm": clip(rng.normal(0.5, 0.17, count)),
     }
     race = rng.dirichlet([0.7] * 3, count)
-    local = np.clip(rng.normal(0, LOCAL_SPREAD, (count, len(local_names))), -0.5, 0.5)
+    local = np.clip(rng.normal(0, spread, (count, len(local_names))), -0.5, 0.5)
     for i, n in enumerate(local_names):
         if n.startswith("head/head-") and not n.endswith(("decr-incr", "down-up", "in-out", "backward-forward")):
             local[:, i] = np.abs(local[:, i])

@@ -5,6 +5,8 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use toile_character::{BodyModel, Joint, Pose};
 use toile_geometry::Mesh;
 
+pub mod strangers;
+
 /// A small deterministic generator of numbers between −1 and 1 (Weyl sequence, mixed).
 pub struct Numbers(pub u64);
 
@@ -15,6 +17,15 @@ impl Numbers {
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// About normal, with a standard deviation of 1.
+    pub fn normal(&mut self) -> f64 {
+        self.next() + self.next() + self.next()
+    }
+
+    pub fn vector(&mut self) -> Vector3<f64> {
+        Vector3::new(self.next(), self.next(), self.next())
     }
 }
 

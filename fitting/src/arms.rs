@@ -1,0 +1,143 @@
+//! Arms that a coarse fit laid onto the trunk, found again.
+//!
+//! Closest points draw an arm that starts too far from its own surface to the nearest other one. Where scan is left
+//! that no part of the body is near, each arm in turn is tried in the directions that it can point in, elbow straight
+//! or bent, and takes the one that agrees best with what the rest of the body leaves over.
+
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use toile_character::Joint;
+
+use crate::{
+    articulated::{Articulated, Posed, State},
+    cloud::{Cloud, Samples},
+    level::Level,
+};
+
+/// Scan farther than this from the body is left over, metres.
+const NEAR: f32 = 0.06;
+/// Part of the scan's area that may be left over before arms are looked for.
+const LEFT_OVER: f32 = 0.012;
+/// Scale of the robust cost of an arm, metres.
+const KERNEL: f32 = 0.05;
+/// How much better than where it is an arm must fit elsewhere.
+const BETTER: f32 = 0.85;
+/// Directions tried: outward from the body by elevation and swing to the front, degrees.
+const ELEVATIONS: [f64; 7] = [-80.0, -55.0, -30.0, -5.0, 20.0, 45.0, 70.0];
+const SWINGS: [f64; 4] = [-30.0, 5.0, 40.0, 75.0];
+/// Turns of the upper arm about itself and bends of the elbow tried together, degrees.
+const ELBOWS: [(f64, f64); 6] = [(0.0, 10.0), (-60.0, 60.0), (0.0, 60.0), (60.0, 60.0), (0.0, 110.0), (60.0, 110.0)];
+
+/// The state with misplaced arms moved; `None` where nothing is left over or nothing fits better.
+pub(crate) fn found_arms(level: &Level, state: &State) -> Option<State> {
+    let posed = level.body.pose(state);
+    let everywhere: Vec<usize> = (0..level.body.len()).collect();
+    let left = left_over(level.reverse, &posed, &everywhere)?;
+    let area = |s: &Samples| s.weights.iter().sum::<f32>();
+    if area(&left) < LEFT_OVER * area(level.reverse) {
+        return None;
+    }
+    let mut best = state.clone();
+    let mut moved = false;
+    for arm in ARMS {
+        if let Some(better) = arm.placed(level, &best) {
+            (best, moved) = (better, true);
+        }
+    }
+    moved.then_some(best)
+}
+
+/// Scan samples that none of the body's vertices `of` is near on the same side; `None` where all are explained.
+fn left_over(scan: &Samples, posed: &Posed, of: &[usize]) -> Option<Samples> {
+    let points = of.iter().map(|&v| posed.points[v]).collect();
+    let normals = of.iter().map(|&v| posed.normals[v]).collect();
+    let body = Cloud::new(Samples { points, normals, ..Samples::default() })?;
+    let far = |k: &usize| body.nearest(&scan.points[*k], &scan.normals[*k], NEAR, 0.3).is_none();
+    let left: Vec<usize> = (0..scan.points.len()).filter(far).collect();
+    (!left.is_empty()).then(|| Samples {
+        points: left.iter().map(|&k| scan.points[k]).collect(),
+        normals: left.iter().map(|&k| scan.normals[k]).collect(),
+        areas: left.iter().map(|&k| scan.areas[k]).collect(),
+        weights: left.iter().map(|&k| scan.weights[k]).collect(),
+        colors: Vec::new(),
+    })
+}
+
+struct Arm {
+    shoulder: Joint,
+    elbow: Joint,
+    wrist: Joint,
+    /// +1 on the left.
+    side: f64,
+}
+
+const ARMS: [Arm; 2] = [
+    Arm { shoulder: Joint::LeftUpperArm, elbow: Joint::LeftLowerArm, wrist: Joint::LeftHand, side: 1.0 },
+    Arm { shoulder: Joint::RightUpperArm, elbow: Joint::RightLowerArm, wrist: Joint::RightHand, side: -1.0 },
+];
+
+impl Arm {
+    fn placed(&self, level: &Level, state: &State) -> Option<State> {
+        let body = level.body;
+        let (own, others): (Vec<usize>, Vec<usize>) = (0..body.len()).partition(|&v| self.holds(body.main_joint(v)));
+        let left = left_over(level.reverse, &body.pose(state), &others)?;
+        let here = cost(level, &left, &body.pose_of(state, &own));
+        let mut best: Option<(f32, State)> = None;
+        for candidate in self.candidates(body, state) {
+            let there = cost(level, &left, &body.pose_of(&candidate, &own));
+            if best.as_ref().is_none_or(|b| there < b.0) {
+                best = Some((there, candidate));
+            }
+        }
+        best.filter(|b| b.0 < BETTER * here).map(|b| b.1)
+    }
+
+    fn holds(&self, joint: Joint) -> bool {
+        let mut at = Some(joint);
+        while let Some(j) = at {
+            if j == self.shoulder {
+                return true;
+            }
+            at = j.parent();
+        }
+        false
+    }
+
+    fn candidates(&self, body: &Articulated, state: &State) -> Vec<State> {
+        let skeleton = body.skeleton_at(&state.beta);
+        let upper = (skeleton.position(self.elbow) - skeleton.position(self.shoulder)).normalize();
+        let lower = (skeleton.position(self.wrist) - skeleton.position(self.elbow)).normalize();
+        let hinge = lower.cross(&Vector3::z());
+        let mut out = Vec::new();
+        for elevation in ELEVATIONS.map(f64::to_radians) {
+            for swing in SWINGS.map(f64::to_radians) {
+                let level = elevation.cos();
+                let direction = Vector3::new(self.side * level * swing.cos(), elevation.sin(), level * swing.sin());
+                let raise = UnitQuaternion::rotation_between(&upper, &direction).unwrap_or_default();
+                for (twist, bend) in ELBOWS.map(|(t, b)| (f64::to_radians(self.side * t), f64::to_radians(b))) {
+                    let mut next = state.clone();
+                    *next.pose.rotation_mut(self.shoulder) = raise * UnitQuaternion::from_scaled_axis(upper * twist);
+                    *next.pose.rotation_mut(self.elbow) = hinge
+                        .try_normalize(1e-9)
+                        .map_or_else(UnitQuaternion::identity, |h| UnitQuaternion::from_scaled_axis(h * bend));
+                    *next.pose.rotation_mut(self.wrist) = UnitQuaternion::identity();
+                    out.push(next);
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Robust disagreement of the arm with the scan plus that of what is left over with the arm, square metres.
+fn cost(level: &Level, left: &Samples, arm: &[(Point3<f32>, Vector3<f32>, f32)]) -> f32 {
+    let robust = |squared: f32| squared / (squared + KERNEL * KERNEL);
+    let forward = arm.iter().map(|(p, n, area)| {
+        let hit = level.scan.nearest(p, n, 2.0 * KERNEL, 0.2);
+        area * hit.map_or(1.0, |q| robust((p - level.scan.samples.points[q as usize]).norm_squared()))
+    });
+    let backward = left.points.iter().zip(&left.weights).map(|(q, w)| {
+        let nearest = arm.iter().map(|(p, ..)| (p - q).norm_squared()).fold(f32::INFINITY, f32::min);
+        w * robust(nearest.min(1.0))
+    });
+    forward.sum::<f32>() + backward.sum::<f32>()
+}
