@@ -16,8 +16,6 @@ use crate::{
     surface::WEIGHT,
 };
 
-/// Borders longer than this are closed by a surface of least area: a plate would bulge, metres.
-const PLATE_LENGTH: f32 = 0.9;
 /// A hole whose border stays below this height over the disk is a sole, metres.
 const SOLE_HEIGHT: f32 = 0.03;
 /// A sole reaches the disk within this distance of its border, metres.
@@ -59,7 +57,7 @@ pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, on_floor: bool) -> (Me
     }
     if closed {
         let soles = if on_floor { sole_borders(&mesh) } else { Vec::new() };
-        let (filled, report) = fill_holes(&mesh, f32::INFINITY, PLATE_LENGTH);
+        let (filled, report) = fill_holes(&mesh, f32::INFINITY);
         cleaned.holes = report.holes;
         mesh = filled;
         flatten_soles(&mut mesh, &soles);

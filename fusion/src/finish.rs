@@ -27,8 +27,8 @@ const MOST_CLOSED: usize = 100;
 const MOST_REFINED: usize = 200;
 /// Most frames whose colours are used.
 const MOST_COLORED: usize = 200;
-/// Frames in which a voxel must have been seen well, in weight units, to be surface.
-const LEAST_WEIGHT: u16 = 6;
+/// Weight units that make a voxel surface: two frames at the most grazing angle.
+const LEAST_WEIGHT: u16 = 2;
 
 /// What the report tells about the final field.
 struct FieldSize {

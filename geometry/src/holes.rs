@@ -19,7 +19,7 @@ use patch::Patch;
 /// Name of the vertex attribute that is 1 where a patch was put in.
 pub const FILLED: &str = "filled";
 
-/// A plate with more than this many times the least area bulges over a hole that is no cap: it is not used.
+/// A plate with more than this many times the membrane's area bulges over a hole that is no cap: it is not used.
 const MOST_BULGE: f64 = 1.2;
 
 /// What was closed.
@@ -33,11 +33,11 @@ pub struct Filled {
     pub left_open: usize,
 }
 
-/// Closes every hole whose border is at most `max_length` long (metres); borders up to `plate_length` are closed by a
-/// thin plate that continues the surroundings, longer ones by a taut membrane. New vertices get the attribute
-/// [`FILLED`] = 1 (old ones 0), and colours and attributes that run on smoothly from the border. The mesh must be a
-/// manifold ([`crate::components::make_manifold`]). Normals are computed anew where there were any.
-pub fn fill_holes(mesh: &Mesh, max_length: f32, plate_length: f32) -> (Mesh, Filled) {
+/// Closes every hole whose border is at most `max_length` long (metres) by a thin plate that continues the
+/// surroundings, or, where that would bulge, by a taut membrane. New vertices get the attribute [`FILLED`] = 1 (old
+/// ones 0), and colours and attributes that run on smoothly from the border. The mesh must be a manifold
+/// ([`crate::components::make_manifold`]). Normals are computed anew where there were any.
+pub fn fill_holes(mesh: &Mesh, max_length: f32) -> (Mesh, Filled) {
     let mut out = mesh.clone();
     out.attributes.entry(FILLED.into()).or_insert_with(|| vec![0.0; mesh.positions.len()]);
     let loops: Vec<Vec<u32>> =
@@ -46,7 +46,7 @@ pub fn fill_holes(mesh: &Mesh, max_length: f32, plate_length: f32) -> (Mesh, Fil
     let around = VertexTriangles::new(mesh.positions.len(), &mesh.triangles);
     let mut filled = Filled::default();
     let patches: Vec<(Vec<u32>, Option<Patch>)> =
-        loops.par_iter().filter_map(|l| close(mesh, &around, l, &taken, max_length, plate_length)).collect();
+        loops.par_iter().filter_map(|l| close(mesh, &around, l, &taken, max_length)).collect();
     for (border, patch) in patches {
         match patch {
             Some(patch) => {
@@ -70,7 +70,6 @@ fn close(
     border: &[u32],
     taken: &BTreeSet<(u32, u32)>,
     max_length: f32,
-    plate_length: f32,
 ) -> Option<(Vec<u32>, Option<Patch>)> {
     let length = loop_length(&mesh.positions, border);
     if length > max_length {
@@ -84,12 +83,10 @@ fn close(
         let mut patch = Patch::new(points, triangles);
         patch.refine(&blocked);
         patch.tighten();
-        if length <= plate_length {
-            let flat = patch.clone();
-            relax::relax(&mut patch, mesh, around, &reversed);
-            if patch.area() > MOST_BULGE * flat.area() {
-                patch = flat;
-            }
+        let membrane = patch.clone();
+        relax::relax(&mut patch, mesh, around, &reversed);
+        if patch.area() > MOST_BULGE * membrane.area() {
+            patch = membrane;
         }
         patch
     });
@@ -178,7 +175,7 @@ mod tests {
     #[test]
     fn two_caps_close_fair_and_outward() {
         let mesh = open_sphere(40, 6..36);
-        let (closed, filled) = fill_holes(&mesh, f32::INFINITY, f32::INFINITY);
+        let (closed, filled) = fill_holes(&mesh, f32::INFINITY);
         assert_eq!((filled.holes, filled.left_open), (2, 0));
         assert!(Edges::new(&closed.triangles).is_closed());
         closed.validate().unwrap();
@@ -194,8 +191,24 @@ mod tests {
     #[test]
     fn long_borders_stay_open_when_told() {
         let mesh = open_sphere(20, 2..12);
-        let (kept, filled) = fill_holes(&mesh, 3.0, 3.0);
+        let (kept, filled) = fill_holes(&mesh, 3.0);
         assert_eq!(filled.holes, 1);
         assert_eq!(boundary_loops(&kept.triangles).len(), 1);
+    }
+
+    /// The plate over a tube's end would be a dome: a skirt's hem is closed flat.
+    #[test]
+    fn a_tube_is_closed_flat() {
+        let mut mesh = open_sphere(40, 10..31);
+        for p in &mut mesh.positions {
+            let radius = p.x.hypot(p.z);
+            (p.x, p.z) = (p.x / radius, p.z / radius);
+        }
+        let (low, high) = mesh.bounds().unwrap();
+        let (closed, filled) = fill_holes(&mesh, f32::INFINITY);
+        assert_eq!(filled.holes, 2);
+        for p in &closed.positions {
+            assert!(p.y > low.y - 0.02 && p.y < high.y + 0.02, "{p} is not between {low} and {high}");
+        }
     }
 }
