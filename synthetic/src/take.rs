@@ -140,6 +140,11 @@ impl Take {
 
     /// What frame `index` shows: true depth and shaded colour, row by row.
     pub fn look(&self, index: usize) -> (TrueImage, Vec<[u8; 3]>) {
+        self.look_through(&self.camera(), index)
+    }
+
+    /// What frame `index` shows through another lens in the camera's place.
+    pub fn look_through(&self, lens: &PinholeCamera, index: usize) -> (TrueImage, Vec<[u8; 3]>) {
         let moment = &self.moments[index];
         let camera_from_room = self.room_from_camera.inverse();
         let turn = UnitQuaternion::from_scaled_axis(Vector3::y() * moment.angle);
@@ -148,10 +153,8 @@ impl Take {
             triangles: self.surface.mesh.triangles.clone(),
             ..Mesh::default()
         };
-        let camera = |room_from_thing: Rigid| Camera {
-            lens: self.camera(),
-            camera_from_world: camera_from_room * room_from_thing,
-        };
+        let camera =
+            |room_from_thing: Rigid| Camera { lens: *lens, camera_from_world: camera_from_room * room_from_thing };
         let turned = Isometry3::from_parts(nalgebra::Translation3::identity(), turn);
         let mut seen = vec![
             Seen { raster: rasterize(&bent, &camera(turned)), mesh: &self.surface.mesh, turn: turn.cast() },
@@ -161,11 +164,11 @@ impl Take {
             let raster = rasterize(room, &camera(Rigid::identity()));
             seen.push(Seen { raster, mesh: room, turn: UnitQuaternion::identity() });
         }
-        self.compose(&seen, index)
+        self.compose(&seen, lens, index)
     }
 
-    fn compose(&self, seen: &[Seen], index: usize) -> (TrueImage, Vec<[u8; 3]>) {
-        let rays = self.camera().rays();
+    fn compose(&self, seen: &[Seen], lens: &PinholeCamera, index: usize) -> (TrueImage, Vec<[u8; 3]>) {
+        let rays = lens.rays();
         let room_from_camera = self.room_from_camera.rotation.cast::<f32>();
         let lights = Lights::over_the_shoulder(Vector3::x(), Vector3::y(), Vector3::z());
         let pixels: Vec<(f32, f32, f32, [u8; 3])> = (0..rays.len())

@@ -5,6 +5,7 @@
 //! real kernel over USB/IP (the wire tier). The models share no code with the drivers that they test.
 //!
 //! - [`kinect1`]: camera and motor of the first Kinect, with faults on demand;
+//! - [`kinect2`]: the second Kinect;
 //! - [`descriptors`]: standard requests, for kernels; [`usbip`]: a model behind USB/IP.
 //!
 //! ```
@@ -18,4 +19,5 @@
 
 pub mod descriptors;
 pub mod kinect1;
+pub mod kinect2;
 pub mod usbip;

@@ -133,7 +133,7 @@ impl State {
             if urb.is_isochronous { self.isochronous(&mut *model, &urb) } else { plain(&mut *model, &urb) }
         };
         let Some(done) = done else { return Ok(false) };
-        if urb.is_isochronous && done.data.is_empty() {
+        if urb.is_in && urb.endpoint != 0x80 && done.data.is_empty() {
             thread::sleep(IDLE);
         }
         let actual = if urb.is_in { done.data.len() } else { done.sent };

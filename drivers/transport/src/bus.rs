@@ -107,6 +107,12 @@ pub trait UsbDevice: Send {
     /// [`TransportError::Busy`] where another program has it.
     fn claim(&mut self, interface: u8, alternate: u8) -> Result<(), TransportError>;
 
+    /// Changes the alternate setting of an interface that was claimed.
+    ///
+    /// # Errors
+    /// As [`Self::control_in`].
+    fn set_alternate(&mut self, interface: u8, alternate: u8) -> Result<(), TransportError>;
+
     /// A control request that brings data; returns how many bytes came. `setup.length` is set from `data`.
     ///
     /// # Errors
@@ -131,7 +137,8 @@ pub trait UsbDevice: Send {
     /// As [`Self::control_in`].
     fn bulk_out(&mut self, endpoint: u8, data: &[u8], limit: Duration) -> Result<usize, TransportError>;
 
-    /// Bytes that one packet of an isochronous endpoint may have (transactions of a microframe together).
+    /// Bytes that one packet of an isochronous endpoint may have (transactions of a microframe, or of USB 3's service
+    /// interval, together).
     fn iso_packet_size(&self, endpoint: u8) -> Option<usize>;
 
     /// Sends a transfer on its way; it comes back from [`Self::wait`].

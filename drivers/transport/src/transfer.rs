@@ -103,6 +103,11 @@ impl Transfer {
         &self.bytes[..self.length.min(self.bytes.len())]
     }
 
+    /// Bytes that each isochronous packet has room for.
+    pub fn packet_room(&self) -> usize {
+        self.packet_size
+    }
+
     /// What came by isochronous packets, in their order; empty slices for packets that brought nothing.
     pub fn packets(&self) -> impl ExactSizeIterator<Item = (PacketStatus, &[u8])> {
         self.packets.iter().enumerate().map(|(i, packet)| {

@@ -75,6 +75,11 @@ impl UsbDevice for LibusbDevice {
         }
     }
 
+    fn set_alternate(&mut self, interface: u8, alternate: u8) -> Result<(), TransportError> {
+        let set = self.shared.handle.set_alternate_setting(interface, alternate);
+        set.or_else(|error| self.failed(error, "changing the alternate setting", Duration::ZERO))
+    }
+
     fn control_in(&mut self, setup: Setup, data: &mut [u8], limit: Duration) -> Result<usize, TransportError> {
         let Setup { request_type, request, value, index, .. } = setup;
         let came = self.shared.handle.read_control(request_type, request, value, index, data, limit);
@@ -102,10 +107,7 @@ impl UsbDevice for LibusbDevice {
         let endpoints = config.interfaces().flat_map(|i| i.descriptors().collect::<Vec<_>>());
         let sizes = endpoints.flat_map(|d| {
             let of_it = d.endpoint_descriptors().filter(|e| e.address() == endpoint);
-            // Bits 12:11 say how many more transactions a microframe has (USB 2.0 table 9-13).
-            of_it
-                .map(|e| usize::from(e.max_packet_size() & 0x7ff) * (1 + usize::from(e.max_packet_size() >> 11 & 3)))
-                .collect::<Vec<_>>()
+            of_it.map(|e| packet_room(e.max_packet_size(), e.extra().unwrap_or_default())).collect::<Vec<_>>()
         });
         sizes.max().filter(|&size| size > 0)
     }
@@ -158,6 +160,35 @@ impl Drop for LibusbDevice {
         let left = self.cancel(PATIENCE);
         if left > 0 {
             tracing::warn!(device = %self.info, left, "transfers did not come back; their memory is left to the system");
+        }
+    }
+}
+
+/// Bytes of one packet by an endpoint's `wMaxPacketSize` and the descriptors behind it.
+fn packet_room(max_packet_size: u16, mut behind: &[u8]) -> usize {
+    // The companion of a USB 3 endpoint says it itself: wBytesPerInterval (USB 3.2 table 9-31).
+    while let [length, kind, rest @ ..] = behind {
+        if let (6, 0x30, [_, _, low, high, ..]) = (length, kind, rest) {
+            return usize::from(u16::from_le_bytes([*low, *high]));
+        }
+        behind = behind.get(usize::from(*length).max(2)..).unwrap_or_default();
+    }
+    // Bits 12:11 say how many more transactions a microframe has (USB 2.0 table 9-13).
+    usize::from(max_packet_size & 0x7ff) * (1 + usize::from(max_packet_size >> 11 & 3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn room_of_packets_by_the_descriptors() {
+        assert_eq!(packet_room(0x0bc0, &[]), 1920);
+        // Eleven bursts of three times 1024 bytes, as the Kinect v2 tells.
+        assert_eq!(packet_room(1024, &[6, 0x30, 10, 2, 0x00, 0x84]), 33_792);
+        assert_eq!(packet_room(1024, &[3, 0x24, 9, 6, 0x30, 0, 0, 0, 4]), 1024);
+        for broken in [&[6, 0x30, 10][..], &[0, 0, 0], &[0]] {
+            assert_eq!(packet_room(0x0bc0, broken), 1920);
         }
     }
 }

@@ -123,6 +123,13 @@ impl UsbDevice for TwinDevice {
         if self.is_here() { Ok(()) } else { Err(TransportError::Unplugged) }
     }
 
+    fn set_alternate(&mut self, interface: u8, alternate: u8) -> Result<(), TransportError> {
+        // SET_INTERFACE, USB 2.0 §9.4.10: what a kernel sends.
+        let (value, index) = (u16::from(alternate), u16::from(interface));
+        let setup = Setup { request_type: 0x01, request: 0x0b, value, index, length: 0 };
+        self.ask("changing the alternate setting", Duration::ZERO, |model| model.control(setup, &[])).map(drop)
+    }
+
     fn control_in(&mut self, setup: Setup, data: &mut [u8], limit: Duration) -> Result<usize, TransportError> {
         let setup = Setup { length: u16::try_from(data.len()).unwrap_or(u16::MAX), ..setup };
         let what = format!("control request {:#04x}", setup.request);
@@ -230,6 +237,7 @@ mod tests {
                 1 => Answer::Data(vec![setup.length as u8; 300]),
                 2 => Answer::Stall,
                 3 => Answer::Silence,
+                0x0b if setup.request_type == 1 && setup.value > 1 => Answer::Stall,
                 _ => Answer::Data(data.to_vec()),
             }
         }
@@ -286,6 +294,8 @@ mod tests {
         let silent = device.control_in(Setup::vendor_in(3, 0), &mut room, LIMIT);
         assert!(matches!(silent, Err(TransportError::TimedOut { .. })));
         assert!(matches!(device.bulk_in(0x81, &mut room, LIMIT), Err(TransportError::Stalled { .. })));
+        assert!(device.set_alternate(0, 1).is_ok());
+        assert!(matches!(device.set_alternate(0, 2), Err(TransportError::Stalled { .. })));
     }
 
     #[test]

@@ -1,0 +1,161 @@
+//! What arrives is what the model sent.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{
+    PATTERN, has_color_of, has_depth_of, plugged,
+    scenes::{calibration, person_content},
+    settings, take,
+};
+use toile_capture::{ClockDomain, ColorImage, Recorder, RecorderOptions, Replay, Source};
+use toile_driver_kinect2::{ColorMode, Kinect2, Settings, color, registration::Registration};
+use toile_driver_models::kinect2::{CameraModel, Optics, Pattern};
+
+#[test]
+fn a_hundred_frames_are_identical_and_none_is_lost() {
+    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let mut kinect = Kinect2::open(&bus, None, settings()).unwrap();
+    for k in 0..100 {
+        let frame = kinect.next_frame().unwrap().unwrap();
+        assert!(has_depth_of(&frame, k) && has_color_of(&frame, k), "frame {k}");
+        assert_eq!((frame.index, frame.device_frame, frame.lost_before), (k, k, 0));
+        assert_eq!(frame.device_time_ns, (k * 8000 / 30) as i64 * 125_000);
+    }
+    let health = kinect.health();
+    assert_eq!((health.frames, health.lost_frames, health.restarts, health.alone), (100, 0, 0, [0, 0]));
+    assert_eq!((health.depth, health.color), Default::default());
+}
+
+#[test]
+fn the_sensor_says_who_it_is_and_the_camera_is_left_switched_off() {
+    let (bus, _, model) = plugged(CameraModel::new(PATTERN.clone()).with_serial("B7"));
+    let kinect = Kinect2::open(&bus, Some("B7"), settings()).unwrap();
+    let identity = kinect.rig().sensors[0].identity.clone();
+    assert_eq!((identity.serial.as_str(), identity.firmware.as_str()), ("B7", "4.3.3913.0"));
+    assert_eq!((identity.clock, identity.model.as_str()), (ClockDomain::Device, "Kinect v2"));
+    assert!(model.lock().unwrap().is_streaming());
+    drop(kinect);
+    assert!(!model.lock().unwrap().is_streaming());
+    let error = Kinect2::open(&bus, Some("B8"), settings()).err().unwrap().to_string();
+    assert!(error.contains("B8") && error.contains("not plugged in"), "{error}");
+}
+
+#[test]
+fn a_slow_link_is_told_before_anything_is_asked() {
+    let model = CameraModel::new(PATTERN.clone()).at_speed(toile_driver_transport::LinkSpeed::High);
+    let (bus, ..) = plugged(model);
+    let error = Kinect2::open(&bus, None, settings()).err().unwrap().to_string();
+    assert!(error.contains("USB 2") && error.contains("blue port"), "{error}");
+}
+
+#[test]
+fn depth_alone_where_no_colour_is_wanted() {
+    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let mut kinect = Kinect2::open(&bus, None, Settings { color: ColorMode::Off, ..settings() }).unwrap();
+    assert!(kinect.rig().sensors[0].color.is_none());
+    let (frames, _) = take(&mut kinect, 4);
+    assert!(frames.iter().zip(0..).all(|(f, k)| has_depth_of(f, k) && f.color.is_none()));
+}
+
+#[test]
+fn a_recorded_take_replayed_and_recorded_again_is_the_same() {
+    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let mut kinect = Kinect2::open(&bus, None, Settings { color: ColorMode::Registered, ..settings() }).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let record = |source: &mut dyn Source, name: &str, count: usize| {
+        let path = folder.path().join(name);
+        let mut recorder = Recorder::create(&path, source.rig(), RecorderOptions::default()).unwrap();
+        let (frames, _) = take(source, count);
+        frames.iter().for_each(|frame| recorder.write(frame).unwrap());
+        recorder.finish().unwrap();
+        (frames, path)
+    };
+    let (live, first) = record(&mut kinect, "first.mcap", 12);
+    let (replayed, second) = record(&mut Replay::open(&first).unwrap(), "second.mcap", 100);
+    let (again, _) = take(&mut Replay::open(&second).unwrap(), 100);
+    assert_eq!(live.len(), 12);
+    assert!(live == replayed && replayed == again);
+    assert_eq!(std::fs::read(first).unwrap(), std::fs::read(second).unwrap());
+}
+
+/// Of every depth pixel and distance: where the driver sees it in colour, and where the model's optics have it.
+#[test]
+fn registration_is_within_half_a_pixel_of_the_optics() {
+    let mut turned = Optics::default();
+    (turned.color.cy, turned.roll, turned.baseline) = (551.0, -0.01, 0.0507);
+    for optics in [Optics::default(), Optics::of_synthetic_sensor(), turned] {
+        let registration = Registration::new(&calibration(optics).1);
+        let (camera, color_from_depth) = registration.color_camera();
+        let mut worst = [0.0_f64; 2];
+        for (u, v) in (0..512).step_by(13).flat_map(|u| (0..424).step_by(17).map(move |v| (u, v))) {
+            for mm in [500_u16, 800, 1200, 2600, 4500] {
+                let z = f64::from(mm) * 1e-3;
+                let truth = optics.color_pixel(u as f64, v as f64, z).unwrap();
+                let told = registration.color_pixel(u, v, f32::from(mm)).map(f64::from);
+                worst[0] = worst[0].max((told[0] - truth[0]).hypot(told[1] - truth[1]));
+                // The colour camera of the rig says the same as the tables.
+                let point = color_from_depth * optics.depth.unproject(u as f64, v as f64, z);
+                let pixel = camera.project(&point).unwrap();
+                worst[1] = worst[1].max((pixel.x - truth[0]).hypot(pixel.y - truth[1]));
+            }
+        }
+        assert!(worst[0] < 0.05 && worst[1] < 0.05, "{worst:?} pixels");
+    }
+}
+
+/// Colours of the pattern say where they are: red the column, green the row.
+#[test]
+fn registered_colours_come_from_the_place_that_the_optics_say() {
+    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let mut kinect = Kinect2::open(&bus, None, Settings { color: ColorMode::Registered, ..settings() }).unwrap();
+    let sensor = kinect.rig().sensors[0].clone();
+    assert_eq!(sensor.color, Some(sensor.depth));
+    let frame = kinect.next_frame().unwrap().unwrap();
+    let (depth, Some(ColorImage::Rgb(image))) = (frame.depth.unwrap(), frame.color) else { panic!("no colour") };
+    let (optics, mut seen) = (Optics::default(), 0);
+    for i in (0..512 * 424).filter(|&i| depth.values[i] > 0) {
+        let (u, v) = ((i % 512) as f64, (i / 512) as f64);
+        let [x, y] = optics.color_pixel(u, v, 1e-3 * f64::from(depth.values[i])).unwrap();
+        if (1.0..1918.0).contains(&x) && (1.0..1078.0).contains(&y) {
+            let truth = Pattern::color(0, x.round() as usize, y.round() as usize);
+            let off = (0..3).map(|k| image.pixels[i][k].abs_diff(truth[k])).max();
+            assert!(off <= Some(4), "{u} {v}: {:?}, {truth:?}", image.pixels[i]);
+            seen += 1;
+        }
+    }
+    assert!(seen > 100_000, "{seen}");
+}
+
+/// A rendered person: depth within the noise of what was rendered, and not mirrored; colour as rendered.
+#[test]
+fn a_rendered_person_is_measured() {
+    let content = person_content(6.0);
+    let (truth, colors) = (content.truth(0), content.color(0));
+    let (bus, ..) = plugged(CameraModel::new(content));
+    let mut kinect = Kinect2::open(&bus, None, settings()).unwrap();
+    let frame = kinect.next_frame().unwrap().unwrap();
+    let (depth, Some(ColorImage::Rgb(image))) = (frame.depth.unwrap(), frame.color) else { panic!("no colour") };
+    let errors: Vec<f64> = (0..512 * 424)
+        .filter(|&i| depth.values[i] > 0)
+        .map(|i| f64::from(depth.values[i]) - 1000.0 * f64::from(truth.depth[i]))
+        .collect();
+    let share = |most: f64| errors.iter().filter(|e| e.abs() <= most).count() as f64 / errors.len() as f64;
+    let mean = errors.iter().filter(|e| e.abs() < 20.0).sum::<f64>() / errors.len() as f64;
+    assert!(errors.len() > 40_000, "{}", errors.len());
+    assert!(share(5.0) > 0.9 && share(20.0) > 0.98 && mean.abs() < 0.3, "{} {} {mean}", share(5.0), share(20.0));
+    let off = |a: &[u8; 3], b: &[u8; 3]| (0..3).map(|k| i32::from(a[k].abs_diff(b[k]))).sum::<i32>();
+    let mean = |turned: bool| {
+        let other = |i: usize| if turned { i - i % 1920 + 1919 - i % 1920 } else { i };
+        let sum: i32 = (0..colors.len()).map(|i| off(&image.pixels[i], &colors[other(i)])).sum();
+        f64::from(sum) / colors.len() as f64
+    };
+    assert!(mean(false) < 8.0 && mean(true) > 2.0 * mean(false), "{} {}", mean(false), mean(true));
+}
+
+#[test]
+fn a_jpeg_that_is_none_leaves_depth_alone() {
+    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    drop(bus);
+    assert!(color::decode(b"no image").is_err());
+}
