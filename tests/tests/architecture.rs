@@ -20,6 +20,7 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("toile-driver-transport", &[]),
     ("toile-driver-kinect1", &["toile-geometry", "toile-capture", "toile-driver-transport"]),
     ("toile-driver-kinect2", &["toile-geometry", "toile-capture", "toile-driver-transport"]),
+    ("toile-driver-realsense", &["toile-geometry", "toile-capture", "toile-driver-transport"]),
     ("toile-driver-models", &["toile-geometry", "toile-capture", "toile-synthetic", "toile-driver-transport"]),
     ("toile-driver-uvc-depth", &["toile-geometry", "toile-capture", "toile-driver-transport"]),
     ("toile-driver-webcam", &["toile-geometry", "toile-capture"]),

@@ -29,26 +29,7 @@ pub struct Descriptors {
 impl Descriptors {
     /// The answer to a standard request; `None` for requests that are not standard.
     pub fn answer(&self, setup: Setup) -> Option<Answer> {
-        if setup.request_type & 0x60 != 0 {
-            return None;
-        }
-        let mut data = match (setup.request, setup.value >> 8) {
-            (0x06, 1) => self.device(),
-            (0x06, 2) => self.configuration(),
-            (0x06, 3) => match self.string(setup.value as u8) {
-                Some(string) => string,
-                None => return Some(Answer::Stall),
-            },
-            // GET_STATUS, GET_CONFIGURATION, GET_INTERFACE
-            (0x00, _) => vec![0, 0],
-            (0x08, _) => vec![1],
-            (0x0a, _) => vec![0],
-            // CLEAR_FEATURE, SET_FEATURE, SET_ADDRESS, SET_CONFIGURATION, SET_INTERFACE
-            (0x01 | 0x03 | 0x05 | 0x09 | 0x0b, _) => Vec::new(),
-            _ => return Some(Answer::Stall),
-        };
-        data.truncate(usize::from(setup.length));
-        Some(Answer::Data(data))
+        standard(setup, self.device(), self.configuration(), &self.strings)
     }
 
     /// The device descriptor, 18 bytes.
@@ -73,17 +54,41 @@ impl Descriptors {
         }
         bytes
     }
+}
 
-    fn string(&self, index: u8) -> Option<Vec<u8>> {
-        if index == 0 {
-            return Some(vec![4, 3, 0x09, 0x04]);
-        }
-        let text: Vec<u8> =
-            self.strings.get(usize::from(index) - 1)?.encode_utf16().flat_map(u16::to_le_bytes).take(252).collect();
-        let mut bytes = vec![text.len() as u8 + 2, 3];
-        bytes.extend(text);
-        Some(bytes)
+/// The answer to a standard request to a device with these descriptors; `None` for requests that are not standard.
+pub fn standard(setup: Setup, device: Vec<u8>, configuration: Vec<u8>, strings: &[String; 3]) -> Option<Answer> {
+    if setup.request_type & 0x60 != 0 {
+        return None;
     }
+    let mut data = match (setup.request, setup.value >> 8) {
+        (0x06, 1) => device,
+        (0x06, 2) => configuration,
+        (0x06, 3) => match string(strings, setup.value as u8) {
+            Some(string) => string,
+            None => return Some(Answer::Stall),
+        },
+        // GET_STATUS, GET_CONFIGURATION, GET_INTERFACE
+        (0x00, _) => vec![0, 0],
+        (0x08, _) => vec![1],
+        (0x0a, _) => vec![0],
+        // CLEAR_FEATURE, SET_FEATURE, SET_ADDRESS, SET_CONFIGURATION, SET_INTERFACE
+        (0x01 | 0x03 | 0x05 | 0x09 | 0x0b, _) => Vec::new(),
+        _ => return Some(Answer::Stall),
+    };
+    data.truncate(usize::from(setup.length));
+    Some(Answer::Data(data))
+}
+
+fn string(strings: &[String; 3], index: u8) -> Option<Vec<u8>> {
+    if index == 0 {
+        return Some(vec![4, 3, 0x09, 0x04]);
+    }
+    let string = strings.get(usize::from(index) - 1)?;
+    let text: Vec<u8> = string.encode_utf16().flat_map(u16::to_le_bytes).take(252).collect();
+    let mut bytes = vec![text.len() as u8 + 2, 3];
+    bytes.extend(text);
+    Some(bytes)
 }
 
 #[cfg(test)]

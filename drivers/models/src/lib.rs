@@ -6,7 +6,9 @@
 //!
 //! - [`kinect1`]: camera and motor of the first Kinect, with faults on demand;
 //! - [`kinect2`]: the second Kinect;
-//! - [`descriptors`]: standard requests, for kernels; [`usbip`]: a model behind USB/IP.
+//! - [`d435`]: the RealSense D435: depth, infrared pair, colour, its monitor and its calibration;
+//! - [`uvc`]: UVC cameras of any shape; [`side_by_side`]: a stereo camera among them;
+//! - [`descriptors`]: standard requests, for kernels; [`usbip`]: a model behind USB/IP; [`vhci`]: plugged into a kernel.
 //!
 //! ```
 //! use std::sync::{Arc, Mutex};
@@ -17,7 +19,11 @@
 //! assert_eq!(bus.list().expect("a virtual bus can be read")[0].product, 0x02ae);
 //! ```
 
+pub mod d435;
 pub mod descriptors;
 pub mod kinect1;
 pub mod kinect2;
+pub mod side_by_side;
 pub mod usbip;
+pub mod uvc;
+pub mod vhci;

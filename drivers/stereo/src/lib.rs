@@ -1,5 +1,6 @@
 //! Stereo rigs as depth cameras: one side-by-side camera, two cameras paired by time, or recorded pairs.
 //!
+//! - [`nodes`]: which video nodes look like stereo cameras;
 //! - [`stream`]: pictures of one camera from a video node or from a folder; [`decode`]: their bytes, pure;
 //! - [`pairing`]: two streams to pairs by time, pure; [`pairs`]: side by side, two cameras, two sensors of a recording;
 //! - [`device`]: the [`toile_capture::Source`] over it all. Matching itself is `toile_stereo`'s.
@@ -31,6 +32,7 @@
 pub mod decode;
 pub mod device;
 pub mod error;
+pub mod nodes;
 pub mod pairing;
 pub mod pairs;
 pub mod stream;

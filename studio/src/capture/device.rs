@@ -1,15 +1,24 @@
 //! `--device`, opened as a source of frames.
 
-use std::{path::PathBuf, str::FromStr};
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use toile_capture::{Layer, Replay, Source, Subject};
 use toile_driver_kinect1::{Kinect1, Settings};
+use toile_driver_realsense::{self as realsense, Realsense};
+use toile_driver_stereo::{StereoCamera, StereoSettings};
 use toile_driver_synthetic::SyntheticDevice;
 use toile_driver_transport::{libusb::LibusbBus, video::kernel::KernelVideo};
 use toile_driver_uvc_depth::{self as uvc_depth, UvcDepthCamera};
 use toile_synthetic::{GarmentKind, GarmentSettings, SyntheticSettings};
 
 use crate::StudioError;
+
+/// How devices are written.
+pub const DEVICES: &str =
+    "kinect1[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION, stereo:FILE, replay:FILE, synthetic[:SEED]";
 
 /// Where frames come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,6 +29,10 @@ pub enum Device {
     Replay(PathBuf),
     /// The first Kinect v1, or that with this serial number.
     Kinect1(Option<String>),
+    /// The first RealSense camera, or that with this serial number.
+    Realsense(Option<String>),
+    /// A stereo rig: the file of its settings.
+    Stereo(PathBuf),
     /// A UVC depth camera: its node, and the file of its calibration.
     Uvc(PathBuf, PathBuf),
 }
@@ -45,11 +58,13 @@ impl FromStr for Device {
             }
             ("replay", Some(file)) => Ok(Self::Replay(file.into())),
             ("kinect1", serial) => Ok(Self::Kinect1(serial.map(String::from))),
+            ("realsense", serial) => Ok(Self::Realsense(serial.map(String::from))),
+            ("stereo", Some(file)) => Ok(Self::Stereo(file.into())),
             ("uvc", Some(rest)) => {
                 let (node, file) = rest.split_once(',').ok_or("write uvc:/dev/video2,calibration.toml")?;
                 Ok(Self::Uvc(node.into(), file.into()))
             }
-            _ => Err("choose of kinect1[:SERIAL], uvc:NODE,CALIBRATION, replay:FILE, synthetic[:SEED]".into()),
+            _ => Err(format!("choose of {DEVICES}")),
         }
     }
 }
@@ -59,7 +74,7 @@ impl Device {
     pub fn pace(&self) -> Pace {
         match self {
             Self::Synthetic(_) | Self::Replay(_) => Pace::OnDemand,
-            Self::Kinect1(_) | Self::Uvc(..) => Pace::Live,
+            Self::Kinect1(_) | Self::Realsense(_) | Self::Stereo(_) | Self::Uvc(..) => Pace::Live,
         }
     }
 
@@ -69,6 +84,7 @@ impl Device {
     /// [`StudioError`] says what is missing and what to do.
     pub fn open(&self, subject: &Subject, layer: &Layer) -> Result<Box<dyn Source>, StudioError> {
         let failed = |reason: String| StudioError::Device(reason);
+        let video = KernelVideo::default();
         match self {
             Self::Synthetic(seed) => {
                 let settings = synthetic(*seed, subject, layer)?;
@@ -81,13 +97,30 @@ impl Device {
                 let opened = Kinect1::open(&bus, serial.as_deref(), Settings::default());
                 Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
             }
+            Self::Realsense(serial) => {
+                let opened = Realsense::open(&video, serial.as_deref(), realsense::Settings::default());
+                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+            }
+            Self::Stereo(file) => {
+                let opened = StereoCamera::open(&video, &stereo_settings(file)?);
+                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+            }
             Self::Uvc(node, calibration) => {
-                let opened =
-                    UvcDepthCamera::open(&KernelVideo::default(), node, calibration, uvc_depth::Settings::default());
+                let opened = UvcDepthCamera::open(&video, node, calibration, uvc_depth::Settings::default());
                 Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
             }
         }
     }
+}
+
+/// Settings of a stereo rig (TOML); files that they name are looked for beside them.
+fn stereo_settings(file: &Path) -> Result<StereoSettings, StudioError> {
+    let text = std::fs::read_to_string(file).map_err(|e| StudioError::io(file, e))?;
+    let wrong = |e: toml::de::Error| StudioError::Usage(format!("{}: {}", file.display(), e.message()));
+    let mut settings: StereoSettings = toml::from_str(&text).map_err(wrong)?;
+    let beside = file.parent().unwrap_or(Path::new(""));
+    settings.calibration.iter_mut().for_each(|path| *path = beside.join(&*path));
+    Ok(settings)
 }
 
 /// The virtual person wears what the subject's layers are called.
@@ -113,6 +146,8 @@ mod tests {
         assert_eq!("synthetic".parse(), Ok(Device::Synthetic(1)));
         assert_eq!("synthetic:42".parse(), Ok(Device::Synthetic(42)));
         assert_eq!("kinect1:A1".parse(), Ok(Device::Kinect1(Some("A1".into()))));
+        assert_eq!("realsense".parse(), Ok(Device::Realsense(None)));
+        assert_eq!("stereo:rig.toml".parse(), Ok(Device::Stereo("rig.toml".into())));
         assert_eq!("replay:a:b.mcap".parse(), Ok(Device::Replay("a:b.mcap".into())));
         assert_eq!("uvc:/dev/video2,c.toml".parse(), Ok(Device::Uvc("/dev/video2".into(), "c.toml".into())));
         for wrong in ["kinect9", "synthetic:x", "replay", "uvc:/dev/video2", ""] {

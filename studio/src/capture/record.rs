@@ -1,6 +1,7 @@
 //! Frames to the file in the order they come. The camera has a thread of its own; nothing is dropped on the way.
 
 use std::{
+    collections::BTreeMap,
     path::Path,
     sync::{
         atomic::{AtomicBool, Ordering},
@@ -77,7 +78,8 @@ pub fn record(
         camera
             .spawn_scoped(scope, move || run_camera(&mut *source, &sender, ends))
             .map_err(|e| StudioError::io(path, e))?;
-        let mut take = Take { recorder, preview, stop, counter: Counter::default(), has_color, times_ns: None };
+        let mut take =
+            Take { recorder, preview, stop, counter: Counter::default(), has_color, times_ns: BTreeMap::new() };
         let ended = take.follow(&frames, path, interrupted, progress);
         // Also after an error the camera must not wait for anybody.
         ends.store(true, Ordering::Release);
@@ -106,8 +108,8 @@ struct Take {
     stop: Stop,
     counter: Counter,
     has_color: bool,
-    /// Device time of the first and the last frame.
-    times_ns: Option<(i64, i64)>,
+    /// Device time of the first and the last frame of each sensor: their clocks differ.
+    times_ns: BTreeMap<usize, (i64, i64)>,
 }
 
 /// How the frames ended.
@@ -161,7 +163,7 @@ impl Take {
         let bytes = std::fs::metadata(part_path(path)).map_or(0, |about| about.len());
         self.counter.push(&frame, self.has_color, bytes, Instant::now());
         let now = frame.device_time_ns;
-        self.times_ns = Some((self.times_ns.map_or(now, |(first, _)| first), now));
+        self.times_ns.entry(frame.sensor).or_insert((now, now)).1 = now;
         self.preview.push(frame);
         Ok(())
     }
@@ -170,7 +172,8 @@ impl Take {
     fn share(&self, seen: &Seen) -> f64 {
         match self.stop {
             Stop::After(seconds) => {
-                let passed = self.times_ns.map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 * 1e-9);
+                let passed = self.times_ns.values().map(|(first, last)| last.saturating_sub(*first) as f64 * 1e-9);
+                let passed = passed.fold(0.0, f64::max);
                 (passed / seconds.max(1e-9)).min(1.0)
             }
             Stop::AfterOneTurn if seen.turn.is_full() => 1.0,

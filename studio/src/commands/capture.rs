@@ -7,11 +7,11 @@ use std::{
 
 use serde_json::json;
 use signal_hook::{consts::SIGINT, flag};
-use toile_capture::{GarmentType, PendingTake, Subject};
+use toile_capture::{GarmentType, PendingTake, Source, Subject};
 
 use crate::{
     StudioError,
-    capture::{Device, Recorded, Stop, record},
+    capture::{Device, Pace, Recorded, RigFile, Stop, record},
     commands::import::remove_empty,
     outcome::Answer,
     run::Session,
@@ -19,7 +19,8 @@ use crate::{
 
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
-Devices: kinect1[:SERIAL], uvc:NODE,CALIBRATION (a UVC depth camera), replay:FILE, synthetic[:SEED].
+Devices: kinect1[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION (a UVC depth camera), stereo:FILE (a stereo rig),
+replay:FILE, synthetic[:SEED]. Several sensors record together with --rig; docs/devices.md tells both files.
 The take ends after one full turn, after --seconds, or with Ctrl-C; whatever came is kept.
 
 Examples:
@@ -44,6 +45,9 @@ pub struct Capture {
     /// Where frames come from
     #[arg(long, value_name = "DEVICE", default_value = "kinect1")]
     device: Device,
+    /// Several sensors that record together: a file with a [[sensor]] for each
+    #[arg(long, value_name = "FILE", conflicts_with = "device")]
+    rig: Option<PathBuf>,
     /// Stop after so many seconds
     #[arg(long, value_name = "N", conflicts_with = "one_turn")]
     seconds: Option<f64>,
@@ -84,12 +88,14 @@ impl Capture {
         } else {
             subject.next_take(&self.layer, self.garment)?
         };
-        let source = self.device.open(subject, &pending.layer)?;
-        let model = source.rig().sensors.first().map(|s| s.identity.model.clone()).unwrap_or_default();
+        let (source, pace) = self.open(subject, &pending)?;
+        let mut models: Vec<String> = source.rig().sensors.iter().map(|s| s.identity.model.clone()).collect();
+        models.dedup();
+        let model = models.join(", ");
         session.progress.plan(1.0);
         session.progress.begin(&format!("{}: capture", pending.layer.label()), 1.0);
         let stop = self.seconds.map_or(Stop::AfterOneTurn, Stop::After);
-        let how = (stop, self.device.pace());
+        let how = (stop, pace);
         let pressed = interrupted()?;
         let recorded = record(source, &pending.path, how, &pressed, &session.progress)?;
         let take = subject.take_path(&pending.layer);
@@ -99,6 +105,16 @@ impl Capture {
         }
         session.progress.end();
         Ok((recorded, take, kept))
+    }
+
+    fn open(&self, subject: &Subject, pending: &PendingTake) -> Result<(Box<dyn Source>, Pace), StudioError> {
+        match &self.rig {
+            Some(file) => {
+                let rig = RigFile::read(file)?;
+                Ok((rig.open(subject, &pending.layer)?, rig.pace()))
+            }
+            None => Ok((self.device.open(subject, &pending.layer)?, self.device.pace())),
+        }
     }
 
     fn answer(&self, recorded: &Recorded, take: &Path, kept: Option<PathBuf>) -> Answer {

@@ -14,6 +14,7 @@ use std::{
 use v4l::{
     Device, Format, FourCC as RawCode, capability,
     control::{Control, Value},
+    framesize::FrameSizeEnum,
     v4l_sys::v4l2_format,
     v4l2::{self, vidioc},
     video::{Capture, capture::Parameters},
@@ -143,6 +144,15 @@ impl VideoNode for KernelNode {
         }
         let offered = self.device.enum_formats().map_err(self.failed("list its formats"))?;
         Ok(offered.into_iter().map(|format| FourCc(format.fourcc.repr)).collect())
+    }
+
+    fn sizes(&self, format: FourCc) -> Result<Vec<(u32, u32)>, TransportError> {
+        let offered = self.device.enum_framesizes(RawCode::new(&format.0)).map_err(self.failed("list its sizes"))?;
+        let discrete = offered.into_iter().filter_map(|offer| match offer.size {
+            FrameSizeEnum::Discrete(size) => Some((size.width, size.height)),
+            FrameSizeEnum::Stepwise(_) => None,
+        });
+        Ok(discrete.collect())
     }
 
     fn set_format(&mut self, format: FourCc, width: u32, height: u32) -> Result<PictureLayout, TransportError> {

@@ -138,6 +138,12 @@ pub trait VideoNode: Send {
     /// [`TransportError::Video`].
     fn formats(&self) -> Result<Vec<FourCc>, TransportError>;
 
+    /// Columns and rows on offer in a format; of a node that has any size, none are told.
+    ///
+    /// # Errors
+    /// [`TransportError::Video`].
+    fn sizes(&self, format: FourCc) -> Result<Vec<(u32, u32)>, TransportError>;
+
     /// Asks for pictures of a kind and size (metadata nodes: the kind alone); returns what the driver gives, which may
     /// be something else.
     ///

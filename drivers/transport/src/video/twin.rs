@@ -292,6 +292,11 @@ impl VideoNode for TwinNode {
         Ok(if self.is_metadata { Vec::new() } else { formats.collect() })
     }
 
+    fn sizes(&self, format: FourCc) -> Result<Vec<(u32, u32)>, TransportError> {
+        let formats = self.stream.formats.iter().filter(|f| f.code == format && !self.is_metadata);
+        Ok(formats.flat_map(|f| f.sizes.iter().map(|s| (s.width, s.height))).collect())
+    }
+
     /// As `uvc_v4l2_try_format`: the format asked for or the first one, and the size that is nearest.
     fn set_format(&mut self, format: FourCc, width: u32, height: u32) -> Result<PictureLayout, TransportError> {
         if self.is_metadata {

@@ -1,0 +1,46 @@
+//! RealSense D4xx (D415, D435, D435i, D455 and alike) as a capture source, through the kernel's video nodes.
+//!
+//! The way of a frame, a file each:
+//!
+//! 1. [`find`]: cameras by their USB device, and their nodes: depth, infrared, colour, and the metadata node of each;
+//! 2. [`monitor`]: commands to the firmware over the extension unit, pure; [`calibration`]: its tables to cameras;
+//! 3. [`controls`]: laser, exposure, preset;
+//! 4. [`metadata`]: payload headers to device time and frame number, pure; [`stream`]: pictures with their metadata;
+//! 5. [`decode`]: buffers to images, pure; [`toile_capture::pairing`]: depth and colour of one time to one frame;
+//! 6. [`device`]: [`Realsense`], the [`toile_capture::Source`] over it all.
+//!
+//! Facts were learnt from librealsense (<https://github.com/IntelRealSense/librealsense>) and Linux' `uvcvideo`; each
+//! constant names its place.
+//!
+//! ```
+//! use toile_capture::Source;
+//! use toile_driver_realsense::{Realsense, Settings};
+//! # use std::sync::{Arc, Mutex};
+//! # use toile_driver_models::{d435, uvc::Wire};
+//! # use toile_driver_transport::{twin::VirtualBus, video::twin::VirtualVideo};
+//! # let bus = VirtualBus::default();
+//! # bus.plug(Arc::new(Mutex::new(d435::model(d435::Pattern::default(), Wire::Bulk))));
+//! # let video = VirtualVideo::new(bus);
+//! // On a machine with a camera: let video = toile_driver_transport::video::kernel::KernelVideo::default();
+//! let mut camera = Realsense::open(&video, None, Settings::default())?;
+//! let frame = camera.next_frame()?.ok_or("it streams")?;
+//! assert_eq!(frame.depth.ok_or("with depth")?.values.len(), 640 * 480);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod calibration;
+pub mod controls;
+pub mod decode;
+pub mod device;
+pub mod error;
+pub mod find;
+pub mod metadata;
+pub mod monitor;
+mod rig;
+pub mod stream;
+
+pub use calibration::Calibration;
+pub use controls::{Controls, Exposure};
+pub use device::{Health, Realsense, Settings, VideoMode};
+pub use error::RealsenseError;
+pub use find::{Camera, list};

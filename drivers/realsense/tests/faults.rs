@@ -1,0 +1,205 @@
+//! Every fault that a RealSense camera can have, and what the driver reports.
+#![allow(missing_docs)]
+
+mod common;
+
+use std::{sync::Arc, time::Instant};
+
+use common::{color_fault, depth_fault, faulty, has_color_of, has_depth_of, pattern, plugged, settings, take};
+use toile_capture::{Recorder, RecorderOptions, Replay, Source};
+use toile_driver_models::{
+    d435::MonitorFault,
+    uvc::{StreamFault, Wire},
+};
+use toile_driver_realsense::{Health, Realsense};
+use toile_driver_transport::{Bus, twin::VirtualBus, video::twin::VirtualVideo};
+
+/// Frame 2's depth is spoilt by a fault: it comes with colour alone, its neighbours are whole.
+fn spoils_frame_2(wire: Wire, what: StreamFault, packet: usize) -> Health {
+    let mut camera = faulty(wire, &[depth_fault(2, packet, what)]);
+    let (frames, error) = take(&mut camera, 6);
+    assert!(error.is_none(), "{what:?}: {error:?}");
+    for (frame, k) in frames.iter().zip(0..) {
+        assert_eq!((frame.device_frame, frame.lost_before), (k, 0), "{what:?}");
+        assert_eq!(has_depth_of(frame, k), k != 2, "{wire:?} {what:?} at {packet} in frame {k}");
+        assert!(frame.depth.is_some() == (k != 2) && has_color_of(frame, k), "{what:?} in frame {k}");
+    }
+    let health = camera.health();
+    assert_eq!((health.alone, health.lost_frames), ([0, 1], 0), "{what:?}");
+    health
+}
+
+#[test]
+fn lost_damaged_short_and_torn_packets_cost_their_picture_only() {
+    for what in [
+        StreamFault::Lost(1),
+        StreamFault::Lost(50),
+        StreamFault::Damaged(1),
+        StreamFault::Short(700),
+        StreamFault::Short(1),
+        StreamFault::Torn,
+        StreamFault::HeaderLength(0),
+        StreamFault::HeaderLength(250),
+        StreamFault::ErrorBit,
+    ] {
+        for packet in [1, 100, 200] {
+            let health = spoils_frame_2(Wire::Isochronous, what, packet);
+            // The kernel's number tells, where the packets that came were enough to count the picture at all.
+            assert_eq!(health.lost_pictures[0], 1, "{what:?} at {packet}");
+        }
+    }
+}
+
+#[test]
+fn bulk_payloads_that_are_not_whole_cost_their_picture_only() {
+    for (what, packet) in
+        [(StreamFault::Lost(1), 3), (StreamFault::Short(100), 5), (StreamFault::Torn, 20), (StreamFault::ErrorBit, 0)]
+    {
+        spoils_frame_2(Wire::Bulk, what, packet);
+    }
+}
+
+#[test]
+fn more_than_a_picture_holds_is_a_damaged_picture() {
+    // Room at the end of the last packet, so that the surplus comes in one payload.
+    assert_eq!(spoils_frame_2(Wire::Isochronous, StreamFault::Long(60), 200).lost_pictures[0], 1);
+}
+
+/// Pictures are told apart by one bit: after a picture that is lost whole, the kernel takes the next one for more of the
+/// one before, and drops it too (`uvc_video_decode_start`). The camera's time tells how many are missing.
+#[test]
+fn a_picture_that_is_lost_whole_takes_the_next_with_it_and_both_are_counted() {
+    for (wire, what) in [(Wire::Isochronous, StreamFault::Lost(usize::MAX)), (Wire::Bulk, StreamFault::HeaderLength(1))]
+    {
+        let mut camera = faulty(wire, &[depth_fault(3, 0, what), color_fault(3, 0, what)]);
+        let (frames, _) = take(&mut camera, 5);
+        let told: Vec<_> = frames.iter().map(|f| (f.device_frame, f.lost_before)).collect();
+        assert_eq!(told, [(0, 0), (1, 0), (2, 0), (5, 2), (6, 0)], "{what:?}");
+        assert!(frames.iter().all(|f| has_depth_of(f, f.device_frame) && has_color_of(f, f.device_frame)));
+        assert_eq!((camera.health().lost_frames, camera.health().alone), (2, [0, 0]));
+    }
+}
+
+#[test]
+fn late_packets_are_no_loss() {
+    let late = [depth_fault(2, 30, StreamFault::Late(20)), color_fault(3, 0, StreamFault::Late(50))];
+    let mut camera = faulty(Wire::Isochronous, &late);
+    let (frames, _) = take(&mut camera, 6);
+    assert!(frames.iter().zip(0..).all(|(f, k)| has_depth_of(f, k) && has_color_of(f, k) && f.lost_before == 0));
+}
+
+#[test]
+fn a_time_that_cannot_be_is_replaced_by_the_kernels() {
+    let nonsense = StreamFault::Time(3_000_000_000);
+    let mut camera = faulty(Wire::Isochronous, &[depth_fault(2, 0, nonsense), color_fault(2, 0, nonsense)]);
+    let (frames, _) = take(&mut camera, 6);
+    for (frame, k) in frames.iter().zip(0..) {
+        assert!(has_depth_of(frame, k) && has_color_of(frame, k) && frame.lost_before == 0, "frame {k}");
+        assert!((frame.device_time_ns - (k * 1_000_000_000 / 30) as i64).abs() < 2_000_000, "{frame:?}");
+    }
+}
+
+#[test]
+fn a_silent_or_halted_stream_is_woken_once_and_then_told() {
+    for (wire, what) in
+        [(Wire::Isochronous, StreamFault::Silent), (Wire::Bulk, StreamFault::Silent), (Wire::Bulk, StreamFault::Stall)]
+    {
+        let both = |frame| [depth_fault(frame, 4, what), color_fault(frame, 4, what)];
+        let mut camera = faulty(wire, &both(3));
+        let (frames, error) = take(&mut camera, 8);
+        assert!(error.is_none(), "{what:?}: {error:?}");
+        assert_eq!(camera.health().restarts, 1, "{wire:?} {what:?}");
+        assert!(frames.iter().all(|f| has_depth_of(f, f.device_frame)));
+        // A camera that stays silent.
+        let mut camera = faulty(wire, &(3..200).flat_map(both).collect::<Vec<_>>());
+        let (frames, error) = take(&mut camera, 12);
+        assert_eq!(frames.len(), 3, "{wire:?} {what:?}");
+        assert!(error.unwrap().to_string().contains("no frame for 0.2 s"));
+        assert!(camera.next_frame().unwrap().is_none());
+    }
+}
+
+#[test]
+fn one_silent_stream_leaves_the_other_unpaired_and_counted() {
+    let mut camera = faulty(Wire::Isochronous, &[color_fault(2, 0, StreamFault::Silent)]);
+    let (frames, error) = take(&mut camera, 8);
+    assert!(error.is_none());
+    assert!(frames.iter().zip(0..).all(|(f, k)| has_depth_of(f, k) && f.color.is_some() == (k < 2)));
+    assert_eq!(camera.health().alone[0], 6);
+}
+
+#[test]
+fn an_unplug_gives_all_whole_frames_then_one_error_then_the_end() {
+    for wire in [Wire::Isochronous, Wire::Bulk] {
+        let mut camera = faulty(wire, &[depth_fault(4, 10, StreamFault::Unplug)]);
+        let (frames, error) = take(&mut camera, 12);
+        assert!(frames.len() >= 4 && frames[..4].iter().zip(0..).all(|(f, k)| has_depth_of(f, k)));
+        assert!(error.unwrap().to_string().contains("unplugged"));
+        assert!(camera.next_frame().unwrap().is_none());
+    }
+}
+
+#[test]
+fn firmware_that_answers_nonsense_is_refused_in_words() {
+    for (fault, words) in [
+        (MonitorFault::Stall, "refused"),
+        (MonitorFault::Silence, "no answer"),
+        (MonitorFault::Error, "error -1"),
+        (MonitorFault::OtherCommand, "answer is to command"),
+        (MonitorFault::Length, "says that it has 60000 bytes"),
+        (MonitorFault::Bit, "checksum"),
+        (MonitorFault::ShortTable, "84 came"),
+        (MonitorFault::OtherTable, "was asked for"),
+        (MonitorFault::NotReady(u32::MAX), "still starting"),
+        (MonitorFault::Nonsense, "error -1"),
+    ] {
+        let mut model = pattern(Wire::Bulk);
+        model.scene().monitor.fault = Some(fault);
+        let (bus, ..) = plugged(model);
+        let start = Instant::now();
+        let opened = Realsense::open(&VirtualVideo::new(bus), None, settings());
+        let error = opened.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(error.contains(words), "{fault:?}: {error}");
+        assert!(start.elapsed().as_secs() < 10);
+    }
+}
+
+#[test]
+fn firmware_that_is_starting_is_waited_for() {
+    let mut model = pattern(Wire::Bulk);
+    model.scene().monitor.fault = Some(MonitorFault::NotReady(2));
+    let (bus, ..) = plugged(model);
+    assert!(Realsense::open(&VirtualVideo::new(bus), None, settings()).unwrap().next_frame().unwrap().is_some());
+}
+
+#[test]
+fn a_hundred_unplugs_and_replugs_end_cleanly_and_nothing_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let fds = || std::fs::read_dir("/proc/self/fd").map_or(0, Iterator::count);
+    let bus = VirtualBus::default();
+    let mut before = 0;
+    for cycle in 0..100u64 {
+        let fault = depth_fault(1 + cycle % 2, 17 * cycle as usize % 38, StreamFault::Unplug);
+        let model = Arc::new(std::sync::Mutex::new(pattern(Wire::Bulk).with_faults([fault])));
+        bus.plug(model.clone());
+        let mut camera = Realsense::open(&VirtualVideo::new(bus.clone()), None, settings()).unwrap();
+        let path = folder.path().join(format!("{cycle}.mcap"));
+        let mut recorder = Recorder::create(&path, camera.rig(), RecorderOptions::default()).unwrap();
+        let (frames, error) = take(&mut camera, 9);
+        assert!(error.is_some_and(|e| e.to_string().contains("unplugged")), "cycle {cycle}");
+        frames.iter().for_each(|frame| recorder.write(frame).unwrap());
+        recorder.finish().unwrap();
+        drop(camera);
+        let replay = Replay::open(&path).unwrap();
+        assert!(replay.lost().is_none() && replay.len() == frames.len() as u64 && replay.len() > cycle % 2);
+        assert!(replay.frame(replay.len() - 1).unwrap() == frames[frames.len() - 1]);
+        std::fs::remove_file(path).unwrap();
+        drop(replay);
+        assert!(bus.list().unwrap().is_empty());
+        assert_eq!(Arc::strong_count(&model), 1, "cycle {cycle}: the device was not given back");
+        if cycle == 20 {
+            before = fds();
+        }
+    }
+    assert_eq!(fds(), before);
+}
