@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# The wire tier: one boot of a small virtual machine, in which a device model sits behind the kernel's own virtual USB
-# host controller and the unmodified `toile capture` records from it through libusb. What it needs is downloaded once
-# into target/outside/wire/ and kept. Prints a line for each check: WIRE kinect1 PASS 100/100, or SKIPPED and why.
+# The wire tier: one boot of a small virtual machine, in which device models sit behind the kernel's own virtual USB host
+# controller and the unmodified `toile capture` records from them, through libusb and through V4L2. Then clients that we
+# did not write stream from the same models: the fidelity gate. What it needs is downloaded once into
+# target/outside/wire/ and kept. Prints a line for each check: WIRE kinect1 PASS 100/100, FIDELITY freenect-camtest PASS,
+# or SKIPPED and why.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here="$PWD/tests/wire"
@@ -9,7 +11,14 @@ rig="$PWD/target/outside/wire"
 frames=${WIRE_FRAMES:-100}
 cycles=${WIRE_CYCLES:-10}
 
-skip() { echo "WIRE kinect1 SKIPPED: $1"; exit 0; }
+skip() {
+    local check
+    for check in "WIRE kinect1" "WIRE realsense-bulk" "WIRE realsense-isochronous" "FIDELITY freenect-camtest" \
+        "FIDELITY gspca_kinect" "FIDELITY pyrealsense2"; do
+        echo "$check SKIPPED: $1"
+    done
+    exit 0
+}
 
 [ "$(uname -sm)" = "Linux x86_64" ] || skip "the virtual machine is made for Linux on x86-64"
 [ "$(id -u)" = 0 ] || skip "only root may read the host's files from within the virtual machine"
@@ -36,6 +45,21 @@ download() {
         # Names of virtual packages cannot be downloaded; qemu says so if one was needed.
         apt-get download -qq "$package" > /dev/null 2>&1 || true
     done
+}
+
+# Clients of the fidelity gate: libfreenect's test, and librealsense for this python. Without them their lines say so.
+clients() {
+    local deb
+    if [ ! -x "$rig/root/usr/bin/freenect-camtest" ]; then
+        (cd "$rig/debs" && apt-get download -qq libfreenect-bin libfreenect0.5 libusb-1.0-0 > /dev/null 2>&1) || true
+        for deb in "$rig"/debs/libfreenect*.deb "$rig"/debs/libusb*.deb; do
+            [ ! -e "$deb" ] || dpkg -x "$deb" "$rig/root"
+        done
+    fi
+    if [ ! -d "$rig/python/pyrealsense2" ]; then
+        python3 -m pip download --no-deps -q -d "$rig/wheels" pyrealsense2 > /dev/null 2>&1 &&
+            python3 -m zipfile -e "$rig"/wheels/pyrealsense2*.whl "$rig/python" > /dev/null 2>&1 || true
+    fi
 }
 
 # Unpacked beside, never installed: installing qemu would remove other packages.
@@ -78,7 +102,7 @@ make_initrd() {
 
 boot() {
     rm -rf "$rig/out" && mkdir -p "$rig/out"
-    unpacked timeout "${WIRE_SECONDS:-900}" "$rig/root/usr/bin/qemu-system-x86_64" -L "$rig/root/usr/share/qemu" \
+    unpacked timeout "${WIRE_SECONDS:-1500}" "$rig/root/usr/bin/qemu-system-x86_64" -L "$rig/root/usr/share/qemu" \
         -L "$rig/root/usr/share/seabios" -M q35 -accel tcg,thread=multi -cpu max,la57=off -smp 2 -m 3072 -nodefaults \
         -no-user-config -display none -no-reboot -serial "file:$rig/out/console" -monitor none \
         -kernel "$rig/kern/boot/vmlinuz-$release" -initrd "$rig/initrd.img" \
@@ -90,11 +114,13 @@ boot() {
 
 bash scripts/cargo.sh build --release --locked --package toile-studio --quiet
 bash scripts/cargo.sh build --release --locked --package toile-driver-kinect1 --example wire_kinect1 --quiet
+bash scripts/cargo.sh build --release --locked --package toile-driver-realsense --example wire_realsense --quiet
 ls "$rig"/debs/linux-image*.deb "$rig"/debs/qemu-system-x86_*.deb > /dev/null 2>&1 || (download) ||
     skip "Debian's kernel and qemu cannot be downloaded (no network?)"
 release=$(basename "$(ls "$rig"/debs/linux-image-*.deb | tail -1)" | sed 's/^linux-image-\([^_]*\)_.*/\1/')
 [ -e "$rig/kern/lib/modules/$release/modules.dep" ] || unpack
+clients
 make_initrd
 boot
-grep -h '^WIRE' "$rig/out/result" 2> /dev/null || echo "WIRE kinect1 FAIL: the virtual machine ended early; see $rig/out/"
+grep -hE '^(WIRE|FIDELITY)' "$rig/out/result" 2> /dev/null || echo "WIRE FAIL: the virtual machine ended early; see $rig/out/"
 ! grep -q FAIL "$rig/out/result" && [ -s "$rig/out/result" ]

@@ -2,16 +2,16 @@
 //!
 //! `wire_kinect1 serve`: plugs the model into the kernel's virtual host controller and serves it until killed;
 //! `wire_kinect1 check FILE COUNT`: compares the first COUNT frames of a take with what the model sent, pixel by pixel;
+//! `wire_kinect1 gspca NODE COUNT`: compares COUNT pictures that the kernel's own driver gives with what the model sent;
 //! `wire_kinect1 cycles COUNT`: unplugs and replugs the model, each time with frames read through libusb.
 #![allow(clippy::print_stdout)]
 
 use std::{
     error::Error,
     fs,
-    os::{fd::AsRawFd, unix::net::UnixStream},
     path::Path,
     sync::{Arc, Mutex},
-    thread::{self, JoinHandle},
+    thread,
     time::{Duration, Instant},
 };
 
@@ -19,16 +19,17 @@ use toile_capture::{ColorImage, Frame, Replay, Source};
 use toile_driver_kinect1::{Kinect1, Settings};
 use toile_driver_models::{
     kinect1::{CameraModel, Content, Pattern},
-    usbip,
+    vhci::{self, Plugged},
 };
-use toile_driver_transport::{Bus, TransportError, libusb::LibusbBus, wait_for};
+use toile_driver_transport::{
+    Bus, TransportError,
+    libusb::LibusbBus,
+    video::{FourCc, Video, kernel::KernelVideo},
+    wait_for,
+};
 
-/// The kernel's virtual host controller.
-const CONTROLLER: &str = "/sys/devices/platform/vhci_hcd.0";
-/// Its first port of USB 2, a device id of our choice, and high speed.
+/// Port of the kernel's virtual host controller.
 const PORT: u32 = 0;
-const DEVICE: u32 = 0x1_0002;
-const HIGH_SPEED: u32 = 3;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -37,40 +38,21 @@ fn main() -> Outcome<()> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
         ["serve"] => {
-            let served = plug()?.thread.join();
-            served.map_err(|_| "the server panicked")?;
+            // The kernel lets go when it is told to; what was being written then is of no use to it.
+            if let Err(error) = plug()?.wait() {
+                println!("server: {error}");
+            }
             Ok(())
         }
         ["check", file, count] => check(Path::new(file), count.parse()?),
+        ["gspca", node, count] => gspca(Path::new(node), count.parse()?),
         ["cycles", count] => cycles(count.parse()?),
-        _ => Err("serve | check FILE COUNT | cycles COUNT".into()),
+        _ => Err("serve | check FILE COUNT | gspca NODE COUNT | cycles COUNT".into()),
     }
 }
 
-/// A model that the kernel sees.
-struct Plugged {
-    line: UnixStream,
-    thread: JoinHandle<()>,
-}
-
 fn plug() -> Outcome<Plugged> {
-    let (kernel, ours) = UnixStream::pair()?;
-    let about = format!("{PORT} {} {DEVICE} {HIGH_SPEED}", kernel.as_raw_fd());
-    fs::write(format!("{CONTROLLER}/attach"), about)?;
-    let mut line = ours.try_clone()?;
-    let thread = thread::spawn(move || {
-        let model = Mutex::new(CameraModel::new(Pattern::default()));
-        if let Err(error) = usbip::serve(&model, &mut line) {
-            println!("server: {error}");
-        }
-    });
-    Ok(Plugged { line: ours, thread })
-}
-
-fn unplug(plugged: Plugged) -> Outcome<()> {
-    plugged.line.shutdown(std::net::Shutdown::Both)?;
-    plugged.thread.join().map_err(|_| "the server panicked")?;
-    Ok(())
+    Ok(vhci::plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()))), PORT)?)
 }
 
 /// True where every pixel of a frame is what the model sent.
@@ -120,6 +102,27 @@ fn check(file: &Path, count: u64) -> Outcome<()> {
     if identical == count { Ok(()) } else { Err("not every frame is what the model sent".into()) }
 }
 
+/// The kernel's driver (`drivers/media/usb/gspca/kinect.c`) gives colour behind the Bayer filter, as it was sent.
+fn gspca(node: &Path, count: u64) -> Outcome<()> {
+    let mut opened = KernelVideo::default().open(node)?;
+    let format = FourCc(*b"GRBG");
+    let layout = opened.set_format(format, 640, 480)?;
+    if layout.format != format {
+        return Err(format!("the driver gives {} where {format} was asked for", layout.format).into());
+    }
+    opened.start(4)?;
+    let (mut next, mut torn) = (0, 0);
+    for _ in 0..count {
+        let buffer = opened.next_buffer(Duration::from_secs(60))?;
+        // The first pictures after the start may be of a frame that was under way.
+        let found = (next..next + 300).find(|k| Pattern::default().bayer(*k) == buffer.bytes);
+        torn += u64::from(found.is_none());
+        next = found.map_or(next, |k| k + 1);
+    }
+    println!("{} of {count} pictures {format} {}x{} identical", count - torn, layout.width, layout.height);
+    if torn <= 1 { Ok(()) } else { Err(format!("{torn} pictures are not what the model sent").into()) }
+}
+
 fn cycles(count: u32) -> Outcome<()> {
     let bus = Arc::new(LibusbBus::new()?);
     let table = millimetres();
@@ -143,7 +146,7 @@ fn cycles(count: u32) -> Outcome<()> {
                 return Err("a frame is not what the model sent".into());
             }
         }
-        unplug(plugged)?;
+        plugged.unplug()?;
         let ended = loop {
             match kinect.next_frame() {
                 Ok(Some(_)) => {}
