@@ -127,6 +127,8 @@ impl Monitor {
             (0x15, 25) => (code, self.optics.coefficients()),
             (0x15, 32) => (code, self.optics.color()),
             (0x15, _) => (NO_SUCH_TABLE, Vec::new()),
+            // RECPARAMSGET: the cameras of depth, one after another (`new_calibration_item`).
+            (0x7e, _) => (code, self.optics.cameras()),
             // UAMG, whether advanced mode is on: no. Temperature, sub-presets and the like: not modelled.
             (0x30, _) => (code, vec![0; 4]),
             _ => (WRONG_COMMAND, Vec::new()),

@@ -70,16 +70,28 @@ impl Optics {
         body.extend(floats([(self.baseline * -1000.0) as f32]));
         body.extend(0u32.to_le_bytes());
         body.extend([0; 88]);
-        for (width, height) in SIZES {
-            // The narrower view of the same sensor: scaled by the columns, cut in the rows.
-            let scale = f64::from(width) / 640.0;
-            let rows = (f64::from(height) - 480.0 * scale) / 2.0;
-            let [cx, cy] = self.center;
-            let told = [self.focal * scale, self.focal * scale, cx * scale, cy * scale + rows];
-            body.extend(floats(told.map(|v| v as f32)));
-        }
+        SIZES.into_iter().for_each(|size| body.extend(floats(self.rectified(size))));
         body.extend([0; 64]);
         table(25, body)
+    }
+
+    /// Columns, rows and camera of every size, without a header.
+    pub(super) fn cameras(&self) -> Vec<u8> {
+        let sizes = SIZES.into_iter().filter(|(width, _)| *width > 0);
+        let item = |size: (u16, u16)| {
+            let mut bytes = [size.0, size.1].map(u16::to_le_bytes).as_flattened().to_vec();
+            bytes.extend(floats(self.rectified(size)));
+            bytes
+        };
+        sizes.flat_map(item).collect()
+    }
+
+    /// Focal lengths and centre: the narrower view of the same sensor, scaled by the columns, cut in the rows.
+    fn rectified(&self, (width, height): (u16, u16)) -> [f32; 4] {
+        let scale = f64::from(width) / 640.0;
+        let rows = (f64::from(height) - 480.0 * scale) / 2.0;
+        let [cx, cy] = self.center;
+        [self.focal * scale, self.focal * scale, cx * scale, cy * scale + rows].map(|v| v as f32)
     }
 
     /// Table 32: the colour camera, calibrated in 1920×1080.
