@@ -163,7 +163,8 @@ pub(super) fn border_weights(patch: &Patch, border: usize) -> Vec<Vec<(u32, f64)
             nearest.sort_unstable_by_key(|n| n.1);
         }
         let sum: f64 = nearest.iter().map(|n| 1.0 / (n.0 + 1e-9)).sum();
-        nearest.into_iter().map(|(d, k)| (k, 1.0 / (d + 1e-9) / sum)).collect()
+        // Collecting from the vector itself would keep room for the whole border in every row.
+        nearest.iter().map(|&(d, k)| (k, 1.0 / (d + 1e-9) / sum)).collect()
     };
     patch.positions[border..].iter().map(row).collect()
 }
