@@ -10,7 +10,7 @@ use toile_geometry::{Rigid, transform_point};
 
 use crate::{
     normals::dot,
-    track::{Normal, Sample, increment, samples},
+    track::{Normal, Sample, hold_open_directions, increment, samples},
     view::View,
 };
 
@@ -85,7 +85,9 @@ fn linearise(
 ) -> Vec<Normal> {
     let one = |&(i, j): &(usize, usize)| {
         let forth = pair_system(&nodes[i], &poses[i], &nodes[j], &poses[j], center, gate, 1.0);
-        forth.plus(&pair_system(&nodes[j], &poses[j], &nodes[i], &poses[i], center, gate, -1.0))
+        let mut both = forth.plus(&pair_system(&nodes[j], &poses[j], &nodes[i], &poses[i], center, gate, -1.0));
+        hold_open_directions(&mut both);
+        both
     };
     pairs.par_iter().map(one).collect()
 }

@@ -14,7 +14,7 @@ use crate::{
     motion::{Axis, find_axis, total_turn},
     report::{FusionReport, VolumeReport},
     surface::extract_surface,
-    track::{register, samples},
+    track::{DEGENERATE, register, samples},
     tsdf::Tsdf,
     view::{View, decode_color},
 };
@@ -105,7 +105,7 @@ impl Fuser {
         let registered = |&i: &usize| {
             let (view, before) = (kept[i].depth.view(window), kept[i].scan_from_camera);
             let tracked = register(&field, &samples(&view, 6000), &before);
-            if tracked.overlap > 0.5 { tracked.scan_from_camera } else { before }
+            if tracked.overlap > 0.5 && tracked.conditioning > DEGENERATE { tracked.scan_from_camera } else { before }
         };
         let poses: Vec<Rigid> = self.clock.time("refine", || keys.par_iter().map(registered).collect());
         let back = self.kept[0].scan_from_camera * poses[0].inverse();
@@ -208,6 +208,9 @@ impl Fuser {
         residuals.sort_unstable_by(f64::total_cmp);
         report.residual_mm = residuals.get(residuals.len() / 2).copied().unwrap_or(0.0);
         report.residual_max_mm = residuals.last().copied().unwrap_or(0.0);
+        let tracked = || self.kept.iter().filter_map(|k| k.tracked);
+        report.conditioning_least = tracked().map(|t| t.conditioning).min_by(f64::total_cmp).unwrap_or(0.0);
+        report.frames_by_color = tracked().filter(|t| t.by_color).count();
         report.warnings = warnings(&report);
         let mut timings = self.clock.timings();
         timings.blocks = field.blocks;

@@ -1,7 +1,8 @@
 //! The stage as an object: frames in one by one, each tracked against the model so far and fused into it.
 
-use nalgebra::{Isometry3, Point3, Vector3};
-use rayon::prelude::*;
+use std::sync::Arc;
+
+use nalgebra::Point3;
 use toile_capture::{ColorImage, Frame, Rig, Sensor};
 use toile_geometry::{Mesh, Rigid};
 
@@ -12,12 +13,13 @@ use crate::{
     motion::MotionModel,
     noise::depth_noise,
     normals::window_for,
-    raycast::ray_cast,
+    photometric::{Held, Picture, Seen, hold},
+    relocalise::{FIRST_TURNS, PATIENCE, best_of, turned_guesses},
     report::{DroppedFrame, Stopwatch},
     surface::extract_surface,
-    track::{Tracked, approach, register, samples, track},
+    track::{DEGENERATE, Tracked, samples, track},
     tsdf::Tsdf,
-    view::{CutDepth, Rectifier, View, is_measured},
+    view::{CutDepth, Rectifier, View, decode_color, is_measured},
     volume::SubjectVolume,
 };
 
@@ -29,8 +31,10 @@ const LEAST_PIXELS: usize = 500;
 const TRUST: (f64, f64, f64) = (0.4, 0.5, 0.4);
 /// A trusted pose departs at most so far from a turntable's prediction: metres at the axis, radians.
 const DEPARTURE: (f64, f64) = (0.06, 0.12);
-/// First guesses of the turn between the first two frames, degrees.
-const FIRST_TURNS: [f64; 11] = [0.0, 1.5, -1.5, 3.5, -3.5, 6.0, -6.0, 9.0, -9.0, 13.0, -13.0];
+/// Points that are compared by colour.
+const COLOR_POINTS: usize = 2500;
+/// An earlier frame that looks from within this angle shows the same surface, radians.
+const ANCHOR_ANGLE: f64 = 0.5;
 /// A residual of so many standard deviations of the frame's own noise is trusted too: far rooms are noisy.
 const NOISE_RESIDUAL: f64 = 2.5;
 /// The band is at least this many standard deviations of the noise.
@@ -66,7 +70,17 @@ pub(crate) struct Kept {
     pub tracked: Option<Tracked>,
 }
 
-/// The stage as an object that takes frames one by one. It never waits for anything.
+/// What is known since the subject was last where it was expected.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Lost {
+    /// Frames in a row without a trusted pose.
+    pub frames: usize,
+    /// Time and pose of the last frame, found elsewhere and not yet confirmed.
+    pub candidate: Option<(i64, Rigid)>,
+}
+
+/// The stage as an object that takes frames one by one. It never waits for anything, nor looks ahead: a frame's pose
+/// and the model with it are there when [`Fuser::push`] returns.
 pub struct Fuser {
     pub(crate) settings: FusionSettings,
     pub(crate) sensor: Sensor,
@@ -77,6 +91,8 @@ pub struct Fuser {
     pub(crate) window: usize,
     pub(crate) motion: MotionModel,
     pub(crate) kept: Vec<Kept>,
+    pub(crate) lost: Lost,
+    pictures: Vec<(usize, Arc<Picture>)>,
     pub(crate) dropped: Vec<DroppedFrame>,
     pub(crate) seen: usize,
     pub(crate) touched: usize,
@@ -107,6 +123,8 @@ impl Fuser {
             sensor,
             volume,
             kept: Vec::new(),
+            lost: Lost::default(),
+            pictures: Vec::new(),
             dropped: Vec::new(),
             seen: 0,
             touched: 0,
@@ -149,6 +167,11 @@ impl Fuser {
             tracked,
         });
         Ok(Outcome::Fused { scan_from_camera, tracked })
+    }
+
+    /// Frames in a row without a trusted pose; 0 while the subject is followed.
+    pub fn lost_frames(&self) -> usize {
+        self.lost.frames
     }
 
     /// The model so far, in the frame of the first poses; for a preview.
@@ -211,39 +234,96 @@ impl Fuser {
         if self.kept.is_empty() {
             return Ok((self.volume.as_ref().map_or_else(Rigid::identity, |v| v.scan_from_camera), None));
         }
-        let predicted = self.motion.predict(frame.device_time_ns);
-        let model = &self.model;
-        let tracked = if self.motion.knows_rate() || self.settings.prior == Prior::None {
-            self.clock.time("track", || track(model, view, &predicted))
-        } else {
-            self.clock.time("first turn", || best_of(model, view, &turned_guesses(&predicted, &FIRST_TURNS)))
+        let candidate = self.lost.candidate.take();
+        let predicted = match &candidate {
+            Some((then, pose)) => self.motion.predict_from(*then, pose, frame.device_time_ns),
+            None => self.motion.predict(frame.device_time_ns),
         };
-        if let Err(reason) = self.trusted(view, &tracked, &predicted) {
-            return self.relocalise(view, &predicted, reason);
+        let tracked = self.track_from(frame, view, &predicted);
+        let Err(reason) = self.trusted(view, &tracked, &predicted) else {
+            if let Some((then, pose)) = candidate {
+                self.motion.push(then, pose);
+            }
+            self.lost.frames = 0;
+            return Ok((tracked.scan_from_camera, Some(tracked)));
+        };
+        if self.lost.frames <= PATIENCE
+            && let Ok(found) = self.relocalise(view, &predicted, String::new())
+        {
+            self.lost.frames = 0;
+            return Ok(found);
         }
-        Ok((tracked.scan_from_camera, Some(tracked)))
+        if self.lost.frames > PATIENCE {
+            self.lost.candidate = self.search(frame.device_time_ns, view, &self.motion.predict(frame.device_time_ns));
+        }
+        Err(self.lost.count(reason))
     }
 
-    /// Tries the key poses and turned predictions; the original reason where none is trusted.
-    fn relocalise(
-        &mut self,
-        view: &View,
-        predicted: &Rigid,
-        reason: String,
-    ) -> Result<(Rigid, Option<Tracked>), String> {
-        let step = (self.kept.len() / 12).max(1);
-        let mut guesses: Vec<Rigid> = self.kept.iter().rev().step_by(step).map(|k| k.scan_from_camera).collect();
-        if self.settings.prior == Prior::Turntable {
-            guesses.extend(turned_guesses(predicted, &FIRST_TURNS));
-        }
+    /// Registers a frame to the model from where it is expected, with colours where the shape leaves a direction open.
+    fn track_from(&mut self, frame: &Frame, view: &View, predicted: &Rigid) -> Tracked {
         let model = &self.model;
-        let tracked = self.clock.time("relocalise", || best_of(model, view, &guesses));
-        let near = if self.settings.prior == Prior::Turntable { *predicted } else { tracked.scan_from_camera };
-        self.trusted(view, &tracked, &near).map_err(|_| reason)?;
-        Ok((tracked.scan_from_camera, Some(tracked)))
+        let turns = !self.motion.knows_rate() && self.settings.prior == Prior::Turntable;
+        let guesses = if turns { turned_guesses(predicted, &FIRST_TURNS) } else { vec![*predicted] };
+        let tracked = if turns {
+            self.clock.time("first turn", || best_of(model, view, &guesses))
+        } else {
+            self.clock.time("track", || track(model, view, predicted))
+        };
+        if tracked.conditioning >= DEGENERATE || frame.color.is_none() {
+            return tracked;
+        }
+        self.track_by_color(frame, view, &guesses).unwrap_or(tracked)
     }
 
-    fn trusted(&self, view: &View, tracked: &Tracked, predicted: &Rigid) -> Result<(), String> {
+    /// The pose at which shape and colours agree best, of several starts; `None` where there are no colours.
+    fn track_by_color(&mut self, frame: &Frame, view: &View, guesses: &[Rigid]) -> Option<Tracked> {
+        let index = self.kept.len();
+        let picture = Arc::new(Picture::new(&*decode_color(frame.color.as_ref(), frame.index)?, &self.sensor));
+        // Of a frame that was dropped.
+        self.pictures.retain(|p| p.0 < index);
+        let near = self.color_anchors(&guesses[0]);
+        for &i in &near {
+            self.remember(i);
+        }
+        self.pictures.push((index, picture.clone()));
+        let pictures: Vec<Seen> = near
+            .iter()
+            .filter_map(|i| {
+                let (_, picture) = self.pictures.iter().find(|p| p.0 == *i)?;
+                Some(Seen { picture, scan_from_camera: self.kept[*i].scan_from_camera })
+            })
+            .collect();
+        let (model, points) = (&self.model, samples(view, COLOR_POINTS));
+        let best = self.clock.time("track by colour", || {
+            let held = guesses.iter().filter_map(|g| hold(model, &points, &picture, &pictures, g));
+            held.min_by(|a: &Held, b: &Held| a.spread.total_cmp(&b.spread))
+        });
+        let last = near.iter().copied().chain([index]).collect::<Vec<_>>();
+        self.pictures.retain(|p| last.contains(&p.0));
+        best.map(|held| held.tracked)
+    }
+
+    /// The last frame, and the first one that looked from about where a pose looks from: the turn closes on it.
+    fn color_anchors(&self, pose: &Rigid) -> Vec<usize> {
+        let last = self.kept.len() - 1;
+        let near = |k: &Kept| k.scan_from_camera.rotation.angle_to(&pose.rotation) < ANCHOR_ANGLE;
+        let mut anchors = vec![last];
+        anchors.extend(self.kept.iter().position(near).filter(|i| *i != last));
+        anchors
+    }
+
+    /// Decodes the colours of a kept frame, if that was not done.
+    fn remember(&mut self, index: usize) {
+        let kept = &self.kept[index];
+        if self.pictures.iter().any(|p| p.0 == index) {
+            return;
+        }
+        if let Some(image) = decode_color(kept.color.as_ref(), kept.index) {
+            self.pictures.push((index, Arc::new(Picture::new(&image, &self.sensor))));
+        }
+    }
+
+    pub(crate) fn trusted(&self, view: &View, tracked: &Tracked, predicted: &Rigid) -> Result<(), String> {
         let (overlap, inliers, residual) = TRUST;
         let mut limit = residual * f64::from(self.model.truncation());
         if tracked.residual > limit {
@@ -273,27 +353,6 @@ impl Fuser {
         }
         Ok(())
     }
-}
-
-/// The pose that fits best among registrations from several starts.
-fn best_of(model: &Tsdf, view: &View, guesses: &[Rigid]) -> Tracked {
-    let few = samples(view, 1500);
-    let score = |t: &Tracked| t.overlap * t.inliers / (t.residual + 1e-3);
-    let rough: Vec<Tracked> = guesses
-        .par_iter()
-        .map(|g| {
-            let seen = ray_cast(model, &view.camera, g, 6);
-            register(model, &few, &approach(&seen, g, &few, g))
-        })
-        .collect();
-    let best = rough.iter().max_by(|a, b| score(a).total_cmp(&score(b)));
-    let start = best.map_or_else(Rigid::identity, |t| t.scan_from_camera);
-    register(model, &samples(view, 6000), &start)
-}
-
-/// A pose turned about the first scan frame's axis by several angles (degrees).
-fn turned_guesses(pose: &Rigid, degrees: &[f64]) -> Vec<Rigid> {
-    degrees.iter().map(|d| Isometry3::rotation(Vector3::y() * d.to_radians()) * pose).collect()
 }
 
 pub(crate) fn first_sensor(rig: &Rig) -> Result<&Sensor, FusionError> {

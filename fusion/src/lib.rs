@@ -4,7 +4,8 @@
 //!
 //! 1. [`depth_filter`] drops depth edges; [`volume`] and [`floor`] find the subject and cut everything else away;
 //! 2. [`track`] registers each frame to the model so far ([`tsdf`], [`raycast`]) from a pose that [`motion`]
-//!    predicts; trusted frames are fused ([`integrate`]);
+//!    predicts, with colours where the shape leaves a direction open; trusted frames are fused ([`integrate`]); a lost
+//!    subject is searched for about the axis and must be confirmed by the next frame;
 //! 3. [`closing`] optimises all poses together over overlapping frame pairs, so that the turn closes;
 //! 4. the frames are fused again and registered to the whole model;
 //! 5. [`surface`] extracts the mesh, [`clean_up`] makes it one closed, smooth, light surface.
@@ -24,7 +25,9 @@ mod lanes;
 pub mod motion;
 pub mod noise;
 pub mod normals;
+mod photometric;
 pub mod raycast;
+mod relocalise;
 pub mod report;
 pub mod scan;
 pub mod settings;

@@ -52,18 +52,23 @@ impl MotionModel {
     pub fn predict(&self, time_ns: i64) -> Rigid {
         let Some(&(t1, last)) = self.poses.last() else { return Rigid::identity() };
         let Some(&(t0, before)) = self.poses.iter().rev().nth(1) else { return last };
-        let axis = if self.prior == Prior::Turntable { self.axis() } else { None };
-        match axis {
-            Some(axis) => axis.turn(self.rate(&axis) * seconds(time_ns - t1)) * last,
-            None => {
-                let ratio = seconds(time_ns - t1) / seconds(t1 - t0).max(1e-6);
-                scaled(&(last * before.inverse()), ratio.clamp(-8.0, 8.0)) * last
-            }
+        if self.axis().is_some() {
+            return self.predict_from(t1, &last, time_ns);
         }
+        let ratio = seconds(time_ns - t1) / seconds(t1 - t0).max(1e-6);
+        scaled(&(last * before.inverse()), ratio.clamp(-8.0, 8.0)) * last
     }
 
-    /// The axis over the recent poses, where they turned far enough.
-    fn axis(&self) -> Option<Axis> {
+    /// The expected pose at a time, had it been `pose` at another: turned on about the axis, where there is one.
+    pub fn predict_from(&self, then_ns: i64, pose: &Rigid, time_ns: i64) -> Rigid {
+        self.axis().map_or(*pose, |axis| axis.turn(self.rate(&axis) * seconds(time_ns - then_ns)) * pose)
+    }
+
+    /// The axis over the recent poses, where there is a turntable and they turned far enough.
+    pub fn axis(&self) -> Option<Axis> {
+        if self.prior != Prior::Turntable {
+            return None;
+        }
         let from = self.poses.len().saturating_sub(60);
         let recent: Vec<Rigid> = self.poses[from..].iter().map(|p| p.1).collect();
         find_axis(&recent).filter(|_| turn_between(recent.first(), recent.last()) > AXIS_TURN)

@@ -59,6 +59,10 @@ pub struct FusionReport {
     pub residual_mm: f64,
     /// The largest residual of a frame, millimetres.
     pub residual_max_mm: f64,
+    /// Least conditioning of a frame's registration: below 0.005 the shape hardly tells a direction.
+    pub conditioning_least: f64,
+    /// Frames whose open direction colours decided.
+    pub frames_by_color: usize,
     /// Frame pairs in the joint optimisation.
     pub closing_pairs: usize,
     /// Frame pairs across the seam.

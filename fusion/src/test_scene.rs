@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
-use toile_capture::{CaptureError, DepthImage, DeviceIdentity, Frame, Rig, Sensor, Source};
+use toile_capture::{CaptureError, ColorImage, DepthImage, DeviceIdentity, Frame, RgbImage, Rig, Sensor, Source};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 /// Capsules (two ends, radius) in the figure's frame: +Y up, feet at 0, facing +Z.
@@ -33,9 +33,24 @@ pub(crate) fn figure_distance(p: &Point3<f64>) -> f64 {
     FIGURE.iter().chain(&FEET).map(one).fold(f64::INFINITY, f64::min)
 }
 
+/// Signed distance to a column with round ends, figure frame: it may turn without its surface moving.
+pub(crate) fn column_distance(p: &Point3<f64>) -> f64 {
+    (p.coords - Vector3::new(0.0, p.y.clamp(0.3, 1.4), 0.0)).norm() - 0.18
+}
+
+/// A smooth pattern without symmetry, figure frame.
+fn paint(p: &Point3<f64>) -> [u8; 3] {
+    let a = p.x.atan2(p.z);
+    let wave = (2.0 * a + 4.0 * p.y).sin() + 0.8 * (5.0 * a - 9.0 * p.y).sin() + 0.7 * (7.0 * a + 14.0 * p.y).cos();
+    [(128.0 + 45.0 * wave) as u8; 3]
+}
+
 /// What is rendered.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
+    /// Signed distance to the figure, figure frame.
+    pub shape: fn(&Point3<f64>) -> f64,
+    pub with_color: bool,
     pub camera: PinholeCamera,
     /// Resting camera in the room: +Y up, origin on the axis at the disk's top.
     pub room_from_camera: Rigid,
@@ -50,6 +65,8 @@ impl Scene {
     pub(crate) fn new() -> Self {
         let look = UnitQuaternion::from_euler_angles(std::f64::consts::PI - 0.087, 0.0, 0.035);
         Self {
+            shape: figure_distance,
+            with_color: false,
             camera: PinholeCamera::ideal(176, 152, 150.0, 150.0, 87.5, 76.0),
             room_from_camera: Isometry3::from_parts(Translation3::new(0.02, 1.0, 2.3), look),
             with_floor: true,
@@ -65,7 +82,7 @@ impl Scene {
         let pixel = |i: u32| {
             let ray = self.camera.unproject(f64::from(i % w), f64::from(i / w), 1.0).coords;
             let room = self.background(&ray);
-            let body = figure_from_room.and_then(|f| trace(&(f * self.room_from_camera), &ray));
+            let body = figure_from_room.and_then(|f| trace(self.shape, &(f * self.room_from_camera), &ray));
             let depth = body.map_or(room, |b| b.min(room));
             if !depth.is_finite() || depth > 6.0 {
                 return 0;
@@ -74,6 +91,18 @@ impl Scene {
             ((depth + noise) * 1000.0).round() as u16
         };
         DepthImage { width: w, height: h, values: (0..w * h).into_par_iter().map(pixel).collect() }
+    }
+
+    /// Colours of the figure turned by `angle`, registered to the depth.
+    fn render_color(&self, angle: f64) -> RgbImage {
+        let (w, h) = (self.camera.width, self.camera.height);
+        let figure_from_camera = self.figure_from_camera(angle);
+        let pixel = |i: u32| {
+            let ray = self.camera.unproject(f64::from(i % w), f64::from(i / w), 1.0).coords;
+            let hit = trace(self.shape, &figure_from_camera, &ray);
+            hit.map_or([30; 3], |t| paint(&(figure_from_camera * Point3::from(ray * t))))
+        };
+        RgbImage { width: w, height: h, pixels: (0..w * h).into_par_iter().map(pixel).collect() }
     }
 
     /// Depth of floor, disk and wall along a camera ray.
@@ -121,7 +150,7 @@ impl Scene {
             device_time_ns: 200_000_000 * i as i64,
             host_time_ns: 200_000_000 * i as i64,
             depth: Some(Arc::new(self.render(*angle, i as u64 + 1))),
-            color: None,
+            color: angle.filter(|_| self.with_color).map(|a| ColorImage::Rgb(Arc::new(self.render_color(a)))),
         };
         angles.iter().enumerate().map(frame).collect()
     }
@@ -136,11 +165,11 @@ pub(crate) fn steps(count: usize, degrees: f64) -> Vec<Option<f64>> {
     (0..count).map(|i| Some((degrees * i as f64).to_radians())).collect()
 }
 
-fn trace(figure_from_camera: &Rigid, ray: &Vector3<f64>) -> Option<f64> {
+fn trace(shape: fn(&Point3<f64>) -> f64, figure_from_camera: &Rigid, ray: &Vector3<f64>) -> Option<f64> {
     let length = ray.norm();
     let mut t = 1.2;
     for _ in 0..80 {
-        let d = figure_distance(&(figure_from_camera * Point3::from(ray * t)));
+        let d = shape(&(figure_from_camera * Point3::from(ray * t)));
         if d < 1e-5 {
             return Some(t);
         }

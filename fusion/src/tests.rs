@@ -11,11 +11,11 @@ use crate::{
     integrate::integrate,
     raycast::ray_cast,
     surface::extract_surface,
-    test_scene::{Scene, figure_distance, steps},
+    test_scene::{Scene, column_distance, figure_distance, steps},
     track::{register, samples, track},
     tsdf::Tsdf,
     view::{CutDepth, Rectifier, View},
-    volume::find_volume,
+    volume::{SubjectVolume, find_volume},
 };
 
 fn settings() -> FusionSettings {
@@ -245,6 +245,63 @@ fn settings_out_of_range_and_missing_depth_are_refused() {
     let mut source = scene.source(&steps(3, 8.0));
     source.frames.iter_mut().for_each(|f| f.depth = None);
     assert!(matches!(fuse(&mut source, &settings(), &|_| {}), Err(FusionError::NoDepth { frames: 3 })));
+}
+
+/// A column's turn by tracking alone and by the finished trajectory, degrees off the truth, and frames held by colour.
+fn column_turn(with_color: bool) -> (f64, f64, usize) {
+    let scene =
+        Scene { shape: column_distance, with_color, with_floor: false, with_wall: false, noise: 0.001, ..Scene::new() };
+    let volume =
+        SubjectVolume { scan_from_camera: scene.room_from_camera, radius: 0.5, bottom: Some(0.0), floor: None };
+    let mut fuser = crate::Fuser::new(&scene.rig(), Some(volume), settings()).unwrap();
+    let angles = steps(30, 6.0);
+    for frame in scene.frames(&angles) {
+        let outcome = fuser.push(&frame).unwrap();
+        assert!(matches!(outcome, Outcome::Fused { .. }), "{outcome:?}");
+    }
+    let truth = scene.figure_from_camera(0.0).inverse() * scene.figure_from_camera(angles[29].unwrap());
+    let off = |a: &Rigid, b: &Rigid| (a.inverse() * b).rotation.angle_to(&truth.rotation).to_degrees();
+    let tracked = off(&fuser.kept[0].scan_from_camera, &fuser.kept[29].scan_from_camera);
+    let scan = fuser.finish(&|_| {}).unwrap();
+    let finished = off(&scan.trajectory[0].scan_from_camera, &scan.trajectory[29].scan_from_camera);
+    (tracked, finished, scan.report.frames_by_color)
+}
+
+#[test]
+fn colours_hold_a_column_that_its_shape_lets_slip() {
+    let (by_shape, _, none) = column_turn(false);
+    assert!(by_shape > 90.0 && none == 0, "{by_shape}° off");
+    let (tracked, finished, by_color) = column_turn(true);
+    assert!(tracked < 2.0 && finished < 2.0, "{tracked}° off when tracked, {finished}° when finished");
+    assert_eq!(by_color, 29);
+}
+
+#[test]
+fn a_subject_that_turned_unseen_is_found_again_without_looking_ahead() {
+    let scene = Scene::new();
+    let mut angles = steps(44, 6.0);
+    angles[24..].iter_mut().for_each(|a| *a = a.map(|a| a + 25.0f64.to_radians()));
+    let frames = scene.frames(&angles);
+    let volume = crate::survey(&scene.rig(), &frames[..20], &settings()).unwrap();
+    let first = volume.scan_from_camera;
+    let mut fuser = crate::Fuser::new(&scene.rig(), Some(volume), settings()).unwrap();
+    let mut dropped = Vec::new();
+    for (i, frame) in frames.iter().enumerate() {
+        match fuser.push(frame).unwrap() {
+            Outcome::Fused { scan_from_camera, .. } => {
+                let moved = scene.figure_from_camera(0.0).inverse() * scene.figure_from_camera(angles[i].unwrap());
+                let (shift, angle) = difference(&(first * moved), &scan_from_camera);
+                assert!(shift < 0.02 && angle < 1.0, "frame {i}: {:.1} mm {angle:.2}°", shift * 1e3);
+                assert_eq!(fuser.lost_frames(), 0);
+            }
+            Outcome::Dropped { reason } => {
+                assert!(reason.starts_with("lost") || reason.contains("departs"), "{reason}");
+                dropped.push(i);
+                assert_eq!(fuser.lost_frames(), dropped.len());
+            }
+        }
+    }
+    assert!(dropped.first() == Some(&24) && dropped.len() <= 6, "{dropped:?}");
 }
 
 #[test]

@@ -25,6 +25,10 @@ const THINNING: usize = 6;
 const NEARLY: f64 = 2e-4;
 /// Distance gates of the coarse iterations, metres.
 const COARSE_GATES: [f64; 7] = [0.10, 0.08, 0.06, 0.05, 0.04, 0.03, 0.03];
+/// A conditioning below this means that the shape hardly tells a direction: a column's turn (a person's is above 0.01).
+pub(crate) const DEGENERATE: f64 = 5e-3;
+/// A direction with less than this share of the largest eigenvalue is open.
+const OPEN: f64 = 1e-3;
 /// Fewer points than this say nothing.
 const LEAST_POINTS: usize = 50;
 /// Most fine iterations.
@@ -62,6 +66,24 @@ pub struct Tracked {
     pub iterations: usize,
     /// True when the last step was negligible.
     pub converged: bool,
+    /// True where the shape left a direction open and colours decided it.
+    pub by_color: bool,
+}
+
+impl Tracked {
+    /// Nothing known yet but a pose.
+    pub(crate) fn at(pose: &Rigid) -> Self {
+        Self {
+            scan_from_camera: *pose,
+            overlap: 0.0,
+            inliers: 0.0,
+            residual: f64::INFINITY,
+            conditioning: 0.0,
+            iterations: 0,
+            converged: false,
+            by_color: false,
+        }
+    }
 }
 
 /// Normal equations of a point-to-plane problem about a centre.
@@ -157,15 +179,7 @@ pub fn register(tsdf: &Tsdf, points: &[Sample], start: &Rigid) -> Tracked {
 fn descend(tsdf: &Tsdf, points: &[Sample], start: &Rigid, enough: f64) -> Tracked {
     let mut pose = *start;
     let truncation = f64::from(tsdf.truncation());
-    let mut result = Tracked {
-        scan_from_camera: pose,
-        overlap: 0.0,
-        inliers: 0.0,
-        residual: f64::INFINITY,
-        conditioning: 0.0,
-        iterations: 0,
-        converged: false,
-    };
+    let mut result = Tracked::at(start);
     let mut cut = truncation * 0.9;
     for iteration in 0..FINE_ITERATIONS {
         if iteration < 3 {
@@ -195,7 +209,7 @@ fn descend(tsdf: &Tsdf, points: &[Sample], start: &Rigid, enough: f64) -> Tracke
 
 /// Distance to the surface and its normal, where the point's own normal agrees with it.
 #[inline]
-fn signed_distance(tsdf: &Tsdf, q: &Point3<f32>, normal: [f32; 3]) -> Option<(f64, [f32; 3])> {
+pub(crate) fn signed_distance(tsdf: &Tsdf, q: &Point3<f32>, normal: [f32; 3]) -> Option<(f64, [f32; 3])> {
     let (d, g) = tsdf.distance_and_gradient(q)?;
     let length = dot(g, g).sqrt();
     if length < 0.2 || d.abs() >= tsdf.truncation() * 0.95 {
@@ -206,7 +220,7 @@ fn signed_distance(tsdf: &Tsdf, q: &Point3<f32>, normal: [f32; 3]) -> Option<(f6
 }
 
 /// Robust standard deviation of the distances (1.4826 × median absolute value); `None` of fewer than 50.
-fn robust_spread(tsdf: &Tsdf, points: &[Sample], pose: &Rigid) -> Option<f64> {
+pub(crate) fn robust_spread(tsdf: &Tsdf, points: &[Sample], pose: &Rigid) -> Option<f64> {
     let mut all: Vec<f64> =
         distances(tsdf, &points.iter().step_by(points.len() / 1000 + 1).copied().collect::<Vec<_>>(), pose)
             .into_iter()
@@ -236,7 +250,7 @@ fn distances(tsdf: &Tsdf, points: &[Sample], pose: &Rigid) -> Vec<Option<f64>> {
 }
 
 /// How well the points fit at the pose found.
-fn assess(tsdf: &Tsdf, points: &[Sample], result: Tracked) -> Tracked {
+pub(crate) fn assess(tsdf: &Tsdf, points: &[Sample], result: Tracked) -> Tracked {
     let all = distances(tsdf, points, &result.scan_from_camera);
     let within: Vec<f64> = all.iter().flatten().copied().collect();
     let mut sizes: Vec<f64> = within.iter().map(|d| d.abs()).collect();
@@ -321,7 +335,7 @@ impl Normal {
 }
 
 /// The damped Gauss–Newton step as a motion, and its size in metres at the subject's radius.
-fn step(system: &Normal, center: &Point3<f64>, damping: f64) -> (Rigid, f64) {
+pub(crate) fn step(system: &Normal, center: &Point3<f64>, damping: f64) -> (Rigid, f64) {
     let h = system.symmetric();
     let lever = damping * h.trace() / 6.0;
     let damped = h + Matrix6::identity() * lever.max(1e-12);
@@ -338,16 +352,60 @@ pub(crate) fn increment(x: &Vector6<f64>, center: &Point3<f64>) -> Rigid {
     Isometry3::from_parts(Translation3::from(shift), rotation)
 }
 
-fn conditioning(system: &Normal) -> f64 {
+/// Least over largest eigenvalue of the scaled normal matrix.
+pub(crate) fn conditioning(system: &Normal) -> f64 {
+    let eigen = scaled_eigen(system).0.eigenvalues;
+    (eigen.min() / eigen.max().max(1e-12)).max(0.0)
+}
+
+/// A direction that the measurements leave open, in the units of a step and in those of a gradient, and what little
+/// the normal matrix holds of it.
+struct Open {
+    step: Vector6<f64>,
+    gradient: Vector6<f64>,
+    stiffness: f64,
+}
+
+/// Makes directions stiff that the measurements leave open: there the solution stays where it is, instead of following
+/// the noise (after Zhang, Kaess and Singh 2016, "On degeneracy of optimization-based state estimation problems").
+pub(crate) fn hold_open_directions(system: &mut Normal) {
+    let (open, largest) = open_directions(system);
+    for o in &open {
+        system.gradient -= o.gradient * o.step.dot(&system.gradient);
+        system.hessian += o.gradient * o.gradient.transpose() * largest;
+    }
+}
+
+/// Takes away what noise says about directions that the measurements leave open: others may decide them.
+pub(crate) fn drop_open_directions(system: &mut Normal) {
+    for o in &open_directions(system).0 {
+        system.gradient -= o.gradient * o.step.dot(&system.gradient);
+        system.hessian -= o.gradient * o.gradient.transpose() * o.stiffness;
+    }
+}
+
+/// The open directions and the stiffness of the best determined one.
+fn open_directions(system: &Normal) -> (Vec<Open>, f64) {
+    let (eigen, scale) = scaled_eigen(system);
+    let largest = eigen.eigenvalues.max();
+    let open = |(k, e): (usize, &f64)| {
+        let u: Vector6<f64> = eigen.eigenvectors.column(k).into();
+        Open { step: u.component_mul(&scale), gradient: u.component_div(&scale), stiffness: e * system.weight }
+    };
+    let few = eigen.eigenvalues.iter().enumerate().filter(|(_, e)| **e < OPEN * largest);
+    (few.map(open).collect(), largest * system.weight)
+}
+
+/// Eigenvalues and vectors of the mean normal matrix with rotations scaled by the subject's size, and the scale.
+fn scaled_eigen(system: &Normal) -> (SymmetricEigen<f64, nalgebra::U6>, Vector6<f64>) {
     let h = system.symmetric() / system.weight.max(1e-12);
     let spread = (h.fixed_view::<3, 3>(0, 0).trace() / h.fixed_view::<3, 3>(3, 3).trace().max(1e-12)).sqrt().max(1e-6);
     let scale = Vector6::new(1.0 / spread, 1.0 / spread, 1.0 / spread, 1.0, 1.0, 1.0);
     let scaled = Matrix6::from_fn(|i, j| h[(i, j)] * scale[i] * scale[j]);
-    let eigen = SymmetricEigen::new(scaled).eigenvalues;
-    (eigen.min() / eigen.max().max(1e-12)).max(0.0)
+    (SymmetricEigen::new(scaled), scale)
 }
 
-fn centroid(points: &[Sample], pose: &Rigid) -> Point3<f64> {
+pub(crate) fn centroid(points: &[Sample], pose: &Rigid) -> Point3<f64> {
     let sum: Vector3<f64> = points.iter().map(|s| s.point.coords.cast::<f64>()).sum();
     pose * Point3::from(sum / points.len().max(1) as f64)
 }
