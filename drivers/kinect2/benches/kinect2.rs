@@ -1,13 +1,50 @@
-//! Benchmarks of the Kinect v2 driver, named stage/case/size: one core, a rendered pattern.
+//! Benchmarks of the Kinect v2 driver, named stage/case/size, on a made-up pattern. Measured is the processor time of this
+//! process, which does everything in one thread.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use std::hint::black_box;
+use std::{hint::black_box, time::Duration};
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{
+    Criterion, criterion_group, criterion_main,
+    measurement::{Measurement, ValueFormatter, WallTime},
+};
 use toile_driver_kinect2::{Calibration, DecodeSettings, Decoder, color, registration::Registration};
 use toile_driver_models::kinect2::{Content, Pattern};
 
-fn decoding(c: &mut Criterion) {
+/// Processor time of this process.
+struct CpuTime;
+
+impl Measurement for CpuTime {
+    type Intermediate = Duration;
+    type Value = Duration;
+
+    fn start(&self) -> Duration {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+        Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
+    }
+
+    fn end(&self, start: Duration) -> Duration {
+        self.start() - start
+    }
+
+    fn add(&self, a: &Duration, b: &Duration) -> Duration {
+        *a + *b
+    }
+
+    fn zero(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn to_f64(&self, value: &Duration) -> f64 {
+        WallTime.to_f64(value)
+    }
+
+    fn formatter(&self) -> &dyn ValueFormatter {
+        const { &WallTime }.formatter()
+    }
+}
+
+fn decoding(c: &mut Criterion<CpuTime>) {
     let mut pattern = Pattern::default();
     let [depth, color, p0] = pattern.optics().answers();
     let calibration = Calibration::parse(&depth, &color, &p0).unwrap();
@@ -29,5 +66,5 @@ fn decoding(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, decoding);
+criterion_group! { name = benches; config = Criterion::default().with_measurement(CpuTime); targets = decoding }
 criterion_main!(benches);

@@ -38,8 +38,11 @@ fn what_is_dropped_is_a_setting() {
     let near = count(DecodeSettings { max_depth: 2.0, ..all });
     let usual = count(all);
     let with_edges = count(DecodeSettings { drop_edges: false, ..all });
-    let with_everything = count(DecodeSettings { drop_edges: false, smooth: false, max_depth: 9.0, ..all });
-    assert!(near < usual && usual < with_edges && with_edges < with_everything);
+    let far = count(DecodeSettings { max_depth: 9.0, ..all });
+    let rough = count(DecodeSettings { smooth: false, ..all });
+    assert!(near < usual && usual < with_edges && usual < far, "{near} {usual} {with_edges} {far}");
+    // Only the bilateral filter finds some edges.
+    assert!(rough != usual);
 }
 
 #[test]

@@ -6,7 +6,8 @@ use std::{
 };
 
 use toile_capture::{Layer, Replay, Source, Subject};
-use toile_driver_kinect1::{Kinect1, Settings};
+use toile_driver_kinect1::{self as kinect1, Kinect1};
+use toile_driver_kinect2::{self as kinect2, Kinect2};
 use toile_driver_realsense::{self as realsense, Realsense};
 use toile_driver_stereo::{StereoCamera, StereoSettings};
 use toile_driver_synthetic::SyntheticDevice;
@@ -17,8 +18,8 @@ use toile_synthetic::{GarmentKind, GarmentSettings, SyntheticSettings};
 use crate::StudioError;
 
 /// How devices are written.
-pub const DEVICES: &str =
-    "kinect1[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION, stereo:FILE, replay:FILE, synthetic[:SEED]";
+pub const DEVICES: &str = "kinect1[:SERIAL], kinect2[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION, stereo:FILE, replay:FILE, \
+     synthetic[:SEED]";
 
 /// Where frames come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub enum Device {
     Replay(PathBuf),
     /// The first Kinect v1, or that with this serial number.
     Kinect1(Option<String>),
+    /// The first Kinect v2, or that with this serial number.
+    Kinect2(Option<String>),
     /// The first RealSense camera, or that with this serial number.
     Realsense(Option<String>),
     /// A stereo rig: the file of its settings.
@@ -58,6 +61,7 @@ impl FromStr for Device {
             }
             ("replay", Some(file)) => Ok(Self::Replay(file.into())),
             ("kinect1", serial) => Ok(Self::Kinect1(serial.map(String::from))),
+            ("kinect2", serial) => Ok(Self::Kinect2(serial.map(String::from))),
             ("realsense", serial) => Ok(Self::Realsense(serial.map(String::from))),
             ("stereo", Some(file)) => Ok(Self::Stereo(file.into())),
             ("uvc", Some(rest)) => {
@@ -74,7 +78,7 @@ impl Device {
     pub fn pace(&self) -> Pace {
         match self {
             Self::Synthetic(_) | Self::Replay(_) => Pace::OnDemand,
-            Self::Kinect1(_) | Self::Realsense(_) | Self::Stereo(_) | Self::Uvc(..) => Pace::Live,
+            Self::Kinect1(_) | Self::Kinect2(_) | Self::Realsense(_) | Self::Stereo(_) | Self::Uvc(..) => Pace::Live,
         }
     }
 
@@ -94,7 +98,12 @@ impl Device {
             Self::Replay(file) => Ok(Box::new(Replay::open(file)?)),
             Self::Kinect1(serial) => {
                 let bus = LibusbBus::new().map_err(|e| failed(e.to_string()))?;
-                let opened = Kinect1::open(&bus, serial.as_deref(), Settings::default());
+                let opened = Kinect1::open(&bus, serial.as_deref(), kinect1::Settings::default());
+                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+            }
+            Self::Kinect2(serial) => {
+                let bus = LibusbBus::new().map_err(|e| failed(e.to_string()))?;
+                let opened = Kinect2::open(&bus, serial.as_deref(), kinect2::Settings::default());
                 Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
             }
             Self::Realsense(serial) => {
@@ -146,6 +155,7 @@ mod tests {
         assert_eq!("synthetic".parse(), Ok(Device::Synthetic(1)));
         assert_eq!("synthetic:42".parse(), Ok(Device::Synthetic(42)));
         assert_eq!("kinect1:A1".parse(), Ok(Device::Kinect1(Some("A1".into()))));
+        assert_eq!("kinect2".parse(), Ok(Device::Kinect2(None)));
         assert_eq!("realsense".parse(), Ok(Device::Realsense(None)));
         assert_eq!("stereo:rig.toml".parse(), Ok(Device::Stereo("rig.toml".into())));
         assert_eq!("replay:a:b.mcap".parse(), Ok(Device::Replay("a:b.mcap".into())));

@@ -16,8 +16,8 @@ use toile_driver_webcam as webcam;
 use crate::{StudioError, outcome::Answer, run::Session};
 
 const AFTER: &str = "\
-`toile capture` records from the Kinect v1, RealSense D4xx, UVC depth cameras (Z16, Y16) and stereo rigs; the Kinect v2
-is only listed. A camera with very wide pictures may be a stereo camera with both views side by side (docs/devices.md).
+`toile capture` records from both Kinects, RealSense D4xx, UVC depth cameras (Z16, Y16) and stereo rigs.
+A camera with very wide pictures may be a stereo camera with both views side by side (docs/devices.md).
 
 Examples:
   toile devices

@@ -41,7 +41,7 @@ const GAIN: [f64; 3] = [1.322_581, 1.0, 1.612_903];
 const P0_UNIT: f64 = -0.000_031 * std::f64::consts::PI;
 /// Millimetres of the light's way, there and back, that ten thirds of 0.625 m are (libfreenect2 `unambigious_dist`).
 const UNIT_MM: f64 = 6250.0 / 3.0;
-/// Millimetres between light and lens, times two... the strength of the parallax (libfreenect2 writes 90).
+/// Strength of the parallax between light and lens, millimetres (libfreenect2 `processPixelStage2`).
 const PARALLAX: f64 = 90.0;
 /// Infrared is told as so many times a third of the light (libfreenect2 `ab_output_multiplier`), and at most as this.
 const INFRARED_GAIN: f32 = 16.0 / 3.0;
@@ -118,28 +118,39 @@ impl Decoder {
         }
         let mut out = Decoded { depth_mm: vec![0.0; COLUMNS * ROWS], infrared: vec![0.0; COLUMNS * ROWS] };
         let Self { settings, tables, rings } = self;
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || pass(rows, *settings, tables, rings, &mut out),
-        );
+        pulp::Arch::new().dispatch(Pass { rows, settings: *settings, tables, rings, out: &mut out });
         Ok(out)
     }
 }
 
-/// One pass: row y is measured, row y − 1 filtered and unwrapped, row y − 2 freed of edges.
-#[inline(always)]
-fn pass(rows: &[[u8; ROW_BYTES]], settings: DecodeSettings, tables: &Tables, rings: &mut Rings, out: &mut Decoded) {
-    let (depth_out, _) = out.depth_mm.as_chunks_mut::<COLUMNS>();
-    let (infrared_out, _) = out.infrared.as_chunks_mut::<COLUMNS>();
-    for y in 0..ROWS + 2 {
-        if y < ROWS {
-            measure(rows, y, tables, &mut rings.phasors[y % 3], &mut infrared_out[y]);
-        }
-        if (1..=ROWS).contains(&y) {
-            distance(y - 1, settings, tables, rings);
-        }
-        if y >= 2 {
-            finish(y - 2, settings, &rings.depths, &mut depth_out[y - 2]);
+/// One pass over a packet, compiled for the vector units at hand.
+struct Pass<'a> {
+    rows: &'a [[u8; ROW_BYTES]],
+    settings: DecodeSettings,
+    tables: &'a Tables,
+    rings: &'a mut Rings,
+    out: &'a mut Decoded,
+}
+
+impl pulp::WithSimd for Pass<'_> {
+    type Output = ();
+
+    /// Row y is measured, row y − 1 filtered and unwrapped, row y − 2 freed of edges.
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { rows, settings, tables, rings, out } = self;
+        let (depth_out, _) = out.depth_mm.as_chunks_mut::<COLUMNS>();
+        let (infrared_out, _) = out.infrared.as_chunks_mut::<COLUMNS>();
+        for y in 0..ROWS + 2 {
+            if y < ROWS {
+                measure(rows, y, tables, &mut rings.phasors[y % 3], &mut infrared_out[y]);
+            }
+            if (1..=ROWS).contains(&y) {
+                distance(y - 1, settings, tables, rings);
+            }
+            if y >= 2 {
+                finish(y - 2, settings, &rings.depths, &mut depth_out[y - 2]);
+            }
         }
     }
 }
@@ -203,9 +214,6 @@ fn finish(y: usize, settings: DecodeSettings, rows: &[DepthRow; 3], out: &mut Ro
 
 impl Tables {
     fn new(calibration: &Calibration) -> Self {
-        let table = |value: &dyn Fn(usize) -> f64| -> Vec<Row<f32>> {
-            (0..ROWS).map(|y| std::array::from_fn(|x| value(y * COLUMNS + x) as f32)).collect()
-        };
         // P0 is told mirrored, as the sensor sees.
         let mirrored = |i: usize| i - i % COLUMNS + COLUMNS - 1 - i % COLUMNS;
         let phase = |f: usize, i: usize| P0_UNIT * f64::from(calibration.p0[f][mirrored(i)]);
@@ -214,10 +222,15 @@ impl Tables {
         let z = |i: usize| UNIT_MM / (1.0 + slope(i)[0].powi(2) + slope(i)[1].powi(2)).sqrt();
         Self {
             lut: lut::lut(),
-            cos: std::array::from_fn(|f| table(&|i| GAIN[f] * phase(f, i).cos())),
-            sin: std::array::from_fn(|f| table(&|i| GAIN[f] * phase(f, i).sin())),
-            z: table(&z),
-            parallax: table(&|i| -slope(i)[0] * z(i) * PARALLAX / (2.0 * UNIT_MM).powi(2)),
+            cos: std::array::from_fn(|f| table(|i| GAIN[f] * phase(f, i).cos())),
+            sin: std::array::from_fn(|f| table(|i| GAIN[f] * phase(f, i).sin())),
+            z: table(z),
+            parallax: table(|i| -slope(i)[0] * z(i) * PARALLAX / (2.0 * UNIT_MM).powi(2)),
         }
     }
+}
+
+/// A table of every pixel.
+fn table(value: impl Fn(usize) -> f64) -> Vec<Row<f32>> {
+    (0..ROWS).map(|y| std::array::from_fn(|x| value(y * COLUMNS + x) as f32)).collect()
 }

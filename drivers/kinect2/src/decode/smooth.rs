@@ -20,40 +20,88 @@ const LEAST_LIGHT: f32 = 3.0;
 /// A pixel whose neighbours are farther than this together lies on an edge.
 const MOST_DISTANCE: f32 = 2.5;
 
+/// Columns with neighbours on both sides.
+const INNER: usize = COLUMNS - 2;
+
+/// Weights, weighted phasors and distances of a row's neighbours so far.
+struct Sums {
+    weight: [f32; INNER],
+    a: [f32; INNER],
+    b: [f32; INNER],
+    distance: [f32; INNER],
+}
+
+/// The inner columns of a row, or those `shift` columns further.
+#[inline(always)]
+fn inner(row: &Row<f32>, shift: usize) -> &[f32; INNER] {
+    match shift {
+        0 => &row.as_chunks::<INNER>().0[0],
+        1 => &row[1..].as_chunks::<INNER>().0[0],
+        _ => &row[2..].as_chunks::<INNER>().0[0],
+    }
+}
+
 /// Filters the middle one of three rows of one frequency; where a pixel lies on an edge, `smooth` becomes false.
 #[inline(always)]
 pub fn smooth_row(rows: [&PhasorRow; 3], out_a: &mut Row<f32>, out_b: &mut Row<f32>, smooth: &mut Row<bool>) {
     const LEAST_SQUARE: f32 = (LEAST_LIGHT * LEAST_LIGHT) / (LIGHT_PER_LENGTH * LIGHT_PER_LENGTH);
-    let [above, here, below] = rows;
-    for x in 1..COLUMNS - 1 {
-        let is_weak = here.square[x] < LEAST_SQUARE;
-        let (least, fall) = if is_weak { (0.0, 0.0) } else { (LEAST_SQUARE, FALL) };
-        let mut sums = [MIDDLE, MIDDLE * here.a[x], MIDDLE * here.b[x], 0.0];
-        let unit = [here.unit_a[x], here.unit_b[x]];
-        let mut add = |row: &PhasorRow, at: usize, share: f32| {
-            let distance = 0.5 - 0.5 * (row.unit_a[at] * unit[0] + row.unit_b[at] * unit[1]);
-            let counts = row.square[at] >= least;
-            let weight = if counts { share * exp(-fall * distance) } else { 0.0 };
-            sums[0] += weight;
-            sums[1] += weight * row.a[at];
-            sums[2] += weight * row.b[at];
-            sums[3] += if counts { distance } else { 0.0 };
-        };
-        add(above, x - 1, CORNER);
-        add(above, x, BESIDE);
-        add(above, x + 1, CORNER);
-        add(here, x - 1, BESIDE);
-        add(here, x + 1, BESIDE);
-        add(below, x - 1, CORNER);
-        add(below, x, BESIDE);
-        add(below, x + 1, CORNER);
+    let here = rows[1];
+    let (mut least, mut fall) = ([0.0; INNER], [0.0; INNER]);
+    let mut sums =
+        Sums { weight: [MIDDLE; INNER], a: *inner(&here.a, 1), b: *inner(&here.b, 1), distance: [0.0; INNER] };
+    let square = inner(&here.square, 1);
+    for x in 0..INNER {
+        least[x] = if square[x] < LEAST_SQUARE { 0.0 } else { LEAST_SQUARE };
+        fall[x] = if square[x] < LEAST_SQUARE { 0.0 } else { -FALL };
+        sums.a[x] *= MIDDLE;
+        sums.b[x] *= MIDDLE;
+    }
+    for (row, corners) in [(rows[0], true), (rows[2], true), (here, false)] {
+        let (beside, middle) = if corners { (CORNER, BESIDE) } else { (BESIDE, 0.0) };
+        add(here, row, 0, beside, &least, &fall, &mut sums);
+        add(here, row, 2, beside, &least, &fall, &mut sums);
+        if corners {
+            add(here, row, 1, middle, &least, &fall, &mut sums);
+        }
+    }
+    for x in 0..INNER {
         // NaN (a weak pixel beside one without any light) is neither.
-        let sound = sums[0] > 0.0;
-        out_a[x] = if sound { sums[1] / sums[0] } else { 0.0 };
-        out_b[x] = if sound { sums[2] / sums[0] } else { 0.0 };
-        smooth[x] &= sums[3] < MOST_DISTANCE;
+        let inverse = if sums.weight[x] > 0.0 { 1.0 / sums.weight[x] } else { 0.0 };
+        sums.weight[x] = inverse;
+    }
+    for x in 0..INNER {
+        let inverse = sums.weight[x];
+        out_a[x + 1] = if inverse > 0.0 { sums.a[x] * inverse } else { 0.0 };
+        out_b[x + 1] = if inverse > 0.0 { sums.b[x] * inverse } else { 0.0 };
+        smooth[x + 1] &= sums.distance[x] < MOST_DISTANCE;
     }
     for x in [0, COLUMNS - 1] {
         (out_a[x], out_b[x]) = (here.a[x], here.b[x]);
+    }
+}
+
+/// Adds one neighbour of each pixel.
+#[inline(always)]
+fn add(
+    here: &PhasorRow,
+    other: &PhasorRow,
+    shift: usize,
+    share: f32,
+    least: &[f32; INNER],
+    fall: &[f32; INNER],
+    sums: &mut Sums,
+) {
+    let (unit_a, unit_b) = (inner(&here.unit_a, 1), inner(&here.unit_b, 1));
+    let (other_a, other_b) = (inner(&other.unit_a, shift), inner(&other.unit_b, shift));
+    let (a, b, square) = (inner(&other.a, shift), inner(&other.b, shift), inner(&other.square, shift));
+    for x in 0..INNER {
+        let counts = square[x] >= least[x];
+        let distance = 0.5 - 0.5 * (other_a[x] * unit_a[x] + other_b[x] * unit_b[x]);
+        let distance = if counts { distance } else { 0.0 };
+        let weight = if counts { share } else { 0.0 } * exp(fall[x] * distance);
+        sums.weight[x] += weight;
+        sums.a[x] += weight * a[x];
+        sums.b[x] += weight * b[x];
+        sums.distance[x] += distance;
     }
 }
