@@ -40,7 +40,7 @@ fn what_is_dropped_is_a_setting() {
     let with_edges = count(DecodeSettings { drop_edges: false, ..all });
     let far = count(DecodeSettings { max_depth: 9.0, ..all });
     let rough = count(DecodeSettings { smooth: false, ..all });
-    assert!(near < usual && usual < with_edges && usual < far, "{near} {usual} {with_edges} {far}");
+    assert!(near < usual && usual <= with_edges && usual < far, "{near} {usual} {with_edges} {far}");
     // Only the bilateral filter finds some edges.
     assert!(rough != usual);
 }

@@ -28,7 +28,7 @@ const EPIPE: i32 = -32;
 const EILSEQ: i32 = -84;
 const ECONNRESET: i32 = -104;
 /// More than any URB asks for.
-const MOST_BYTES: usize = 1 << 20;
+const MOST_BYTES: usize = 1 << 22;
 const MOST_PACKETS: usize = 1024;
 /// A URB without data takes so long, so that an idle stream does not take the whole processor.
 const IDLE: Duration = Duration::from_millis(1);

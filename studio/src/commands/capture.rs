@@ -19,8 +19,8 @@ use crate::{
 
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
-Devices: kinect1[:SERIAL], kinect2[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION (a UVC depth camera), stereo:FILE (a stereo rig),
-replay:FILE, synthetic[:SEED]. Several sensors record together with --rig; docs/devices.md tells both files.
+Devices: kinect1[:SERIAL], kinect2[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION (a UVC depth camera),
+stereo:FILE (a stereo rig), replay:FILE, synthetic[:SEED]. Several sensors record together with --rig; docs/devices.md tells both files.
 The take ends after one full turn, after --seconds, or with Ctrl-C; whatever came is kept.
 
 Examples:

@@ -58,3 +58,32 @@ pub fn edge_row(rows: [&DepthRow; 3], out: &mut Row<f32>) {
         out[x] = here.depth[x];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The middle pixel at `middle` between a near and a far surface whose light differs by `contrast`.
+    fn between(middle: f32, contrast: f32) -> f32 {
+        let mut row = DepthRow::default();
+        for x in 0..COLUMNS {
+            row.depth[x] = if x < 256 { 1000.0 } else { 1300.0 };
+            row.light[x] = if x < 256 { 400.0 } else { 400.0 * contrast };
+        }
+        row.depth[256] = middle;
+        row.smooth = row.depth;
+        let mut out = [0.0; COLUMNS];
+        edge_row([&row, &row, &row], &mut out);
+        assert_eq!((out[0], out[100], out[400]), (1000.0, 1000.0, 1300.0));
+        out[256]
+    }
+
+    #[test]
+    fn a_pixel_between_two_surfaces_is_dropped_where_light_jumps_too() {
+        assert_eq!(between(1150.0, 0.5), 0.0);
+        assert_eq!(between(1150.0, 1.0), 1150.0);
+        // Beside one of them it is no mix.
+        assert_eq!(between(1300.0, 0.5), 1300.0);
+        assert_eq!(between(1040.0, 0.5), 1040.0);
+    }
+}
