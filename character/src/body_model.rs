@@ -53,6 +53,22 @@ impl Region {
         Self::ALL.get(usize::from(code)).copied()
     }
 
+    /// In words, such as `left hand`.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Torso => "torso",
+            Self::LeftArm => "left arm",
+            Self::RightArm => "right arm",
+            Self::LeftLeg => "left leg",
+            Self::RightLeg => "right leg",
+            Self::LeftHand => "left hand",
+            Self::RightHand => "right hand",
+            Self::LeftFoot => "left foot",
+            Self::RightFoot => "right foot",
+            Self::Head => "head",
+        }
+    }
+
     /// True for hands, feet and head: thin or detailed, and left out where bodies are scored.
     pub fn is_extremity(self) -> bool {
         use Region::*;
@@ -200,6 +216,21 @@ impl BodyModel {
             JointRegressor::Affine => self.joints_affine(beta),
             JointRegressor::MeanValue => self.mean_value_joints(&self.shape(beta)),
         }
+    }
+
+    /// This model with joints that follow β by `regressor`, so that a fit works with them. Mean value coordinates are
+    /// linear in the vertices, hence affine in β as well.
+    pub fn with_joints_by(&self, regressor: JointRegressor) -> Self {
+        let mut model = self.clone();
+        if regressor == JointRegressor::MeanValue {
+            let weights = self.mean_value_weights();
+            let of = |column: &Vec<Vector3<f32>>| -> Vec<Vector3<f64>> {
+                let joint = |w: &Vec<f64>| w.iter().zip(column).map(|(w, d)| d.cast::<f64>() * *w).sum();
+                weights.iter().map(joint).collect()
+            };
+            model.joint_components = self.components.par_iter().map(of).collect();
+        }
+        model
     }
 
     /// The body with coefficients `beta` as a skinned mesh at rest.

@@ -16,16 +16,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let model = BodyModel::load_default()?;
     let scan = ply::read(Path::new(first))?;
     let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {})?;
-    let (mut pose, mut dressed) = (fit.pose.clone(), rigged_scan(&scan, &fit.body, &fit.pose));
+    let mut dressed = rigged_scan(&scan, &fit.body, &fit.pose);
     for (n, path) in next.iter().enumerate() {
         let scan = ply::read(Path::new(path))?;
         let start = Instant::now();
-        let under = pose_under(&dressed, &[], &pose, &scan, &UnderSettings::default(), &|_| {})?;
+        let under = pose_under(&dressed, &[], &fit.pose, &scan, &UnderSettings::default(), &|_| {})?;
         println!("{path}: {:.2} s {}", start.elapsed().as_secs_f64(), serde_json::to_string(&under.report)?);
         let start = Instant::now();
         let settled = settle_under(&model, &fit.body, &under.pose, &scan)?;
         println!("  {:.2} s {:?}", start.elapsed().as_secs_f64(), settled.report);
-        pose = settled.pose;
+        let pose = settled.pose;
         ply::write(&out.join(format!("{}-body.ply", n + 1)), &settled.mesh)?;
         ply::write(&out.join(format!("{}-dressed.ply", n + 1)), &dressed.posed_mesh(&pose))?;
         let joints: std::collections::BTreeMap<_, [f64; 3]> = toile_character::joint::JOINTS

@@ -21,6 +21,8 @@ const LEFT_OVER: f32 = 0.012;
 const KERNEL: f32 = 0.05;
 /// How much better than where it is an arm must fit elsewhere.
 const BETTER: f32 = 0.85;
+/// Most points of what is left over that an arm is judged by.
+const MOST: usize = 200;
 /// Directions tried: outward from the body by elevation and swing to the front, degrees.
 const ELEVATIONS: [f64; 7] = [-80.0, -55.0, -30.0, -5.0, 20.0, 45.0, 70.0];
 const SWINGS: [f64; 4] = [-30.0, 5.0, 40.0, 75.0];
@@ -135,9 +137,10 @@ fn cost(level: &Level, left: &Samples, arm: &[(Point3<f32>, Vector3<f32>, f32)])
         let hit = level.scan.nearest(p, n, 2.0 * KERNEL, 0.2);
         area * hit.map_or(1.0, |q| robust((p - level.scan.samples.points[q as usize]).norm_squared()))
     });
-    let backward = left.points.iter().zip(&left.weights).map(|(q, w)| {
+    let stride = left.points.len().div_ceil(MOST);
+    let backward = left.points.iter().zip(&left.weights).step_by(stride.max(1)).map(|(q, w)| {
         let nearest = arm.iter().map(|(p, ..)| (p - q).norm_squared()).fold(f32::INFINITY, f32::min);
         w * robust(nearest.min(1.0))
     });
-    forward.sum::<f32>() + backward.sum::<f32>()
+    forward.sum::<f32>() + stride as f32 * backward.sum::<f32>()
 }

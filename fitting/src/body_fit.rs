@@ -1,16 +1,17 @@
 //! Shape and pose of the statistical body from one scan (Hu et al. 2017, §5.2, eq. 4), then conformation.
 
 use nalgebra::Point3;
-use toile_character::{BodyModel, Pose, Skeleton, SkinnedMesh, skinning};
+use toile_character::{BodyModel, JointRegressor, Pose, Skeleton, SkinnedMesh, skinning};
 use toile_geometry::Mesh;
 
 use crate::{
-    FitSettings, FittingError, Mend, Verdict,
+    FitSettings, FittingError, Mend, ScanLandmark, Verdict,
     articulated::{Articulated, Columns, State},
     cloud::{Cloud, Samples},
     conform::{Conformed, conform},
-    correspond::Gate,
+    correspond::{Gate, inside},
     fingers::fit_fingers,
+    landmarks::{landmarks, mended},
     level::{Level, LevelResult, body_joints},
     measure::{Measurements, measure, stature},
     prepare::{Prepared, prepare},
@@ -36,6 +37,8 @@ pub struct BodyFit {
     pub model_mesh: Mesh,
     /// How the input was brought to metres and upright; the identity for a scan as it should be.
     pub mend: Mend,
+    /// The model's landmarks on the scan, in its (mended) frame.
+    pub landmarks: Vec<ScanLandmark>,
     /// Stature and girths of the conformed body.
     pub measurements: Measurements,
     /// Residuals, coverage, iterations, notices.
@@ -71,19 +74,30 @@ pub fn fit_body(
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<BodyFit, FittingError> {
     check(settings)?;
+    let other;
+    let model = if settings.joints == JointRegressor::Affine {
+        model
+    } else {
+        other = model.with_joints_by(settings.joints);
+        &other
+    };
     progress(0.0);
     let prepared = prepare(scan)?;
     let trust = trust_of(&prepared.mesh);
-    let starts = starts(model, &prepared.mesh, &trust, &prepared.ups, settings.headings)?;
+    let starts = starts(model, &prepared.mesh, &trust, &prepared.ups, settings)?;
     progress(0.25);
     let (state, up, coarse_iterations) = best_start(model, &prepared, &trust, settings, starts)?;
     let (scan, state, mend) = stand(&prepared, model, state, up);
     progress(0.45);
     let fine = refine(model, &scan, &trust, settings, state)?;
     progress(0.7);
-    let conformed = conform(model, &fine.state, &scan, &trust, settings)?;
+    let by_hand = mended(model, &settings.landmarks, &mend)?;
+    let posed = model.posed(&fine.state.beta, &fine.state.pose);
+    let landmarks = landmarks(model, &posed, &scan, &trust, &by_hand);
+    let conformed = conform(model, &fine.state, &scan, &trust, settings, &landmarks)?;
     progress(0.95);
-    let fit = assemble(model, &scan, &trust, fine, conformed, Context { prepared, mend, coarse_iterations });
+    let context = Context { prepared, mend, coarse_iterations, landmarks, dressed: settings.dressed };
+    let fit = assemble(model, &scan, &trust, fine, conformed, context);
     progress(1.0);
     Ok(fit)
 }
@@ -118,12 +132,13 @@ fn best_start(
     settings: &FitSettings,
     starts: Vec<Start>,
 ) -> Result<(State, usize, usize), FittingError> {
-    let gate = Gate { distance: 0.1, slip: 0.04, min_cos: 0.5, kernel: 0.025, noise: 0.006 };
+    let gate = Gate { distance: 0.1, slip: 0.04, min_cos: 0.5, kernel: 0.025, noise: 0.006, inside: inside(settings) };
     let resolution = Resolution { cell: 0.014, body_cell: 0.028, components: 12, iterations: 10, gate };
+    let sampled = resolution.sampled(model, &prepared.mesh, trust, settings)?;
     let mut best: Option<(f64, State, usize)> = None;
     let mut iterations = starts.iter().map(|s| s.iterations).sum();
     for start in starts.into_iter().take(2) {
-        let result = resolution.run(model, &prepared.mesh, trust, settings, start.state)?;
+        let result = sampled.run(model, settings, start.state)?;
         iterations += result.iterations;
         if best.as_ref().is_none_or(|b| result.matches.misfit < b.0) {
             best = Some((result.matches.misfit, result.state, start.up));
@@ -151,17 +166,21 @@ fn refine(
     settings: &FitSettings,
     state: State,
 ) -> Result<LevelResult, FittingError> {
-    let gate = Gate { distance: 0.05, slip: 0.015, min_cos: 0.6, kernel: 0.010, noise: 0.003 };
-    let middle = Resolution { cell: 0.009, body_cell: 0.018, components: settings.components, iterations: 8, gate };
-    let first = middle.run(model, scan, trust, settings, state)?;
+    let gate =
+        Gate { distance: 0.05, slip: 0.015, min_cos: 0.6, kernel: 0.010, noise: 0.003, inside: inside(settings) };
+    let middle = Resolution { cell: 0.009, body_cell: 0.024, components: settings.components, iterations: 8, gate };
+    let first = middle.sampled(model, scan, trust, settings)?.run(model, settings, state)?;
     let gate = Gate { distance: 0.025, slip: 0.01, kernel: 0.006, noise: settings.noise as f32, ..gate };
     let iterations = settings.fine_iterations;
     let fine = Resolution { cell: 0.006, body_cell: 0.010, components: settings.components, iterations, gate };
-    let mut last = fine.run(model, scan, trust, settings, first.state)?;
+    let mut last = fine.sampled(model, scan, trust, settings)?.run(model, settings, first.state)?;
     last.iterations += first.iterations;
     last.state = fit_fingers(model, scan, trust, settings, last.state)?;
     Ok(last)
 }
+
+/// Cell of the scan's samples that are looked up on the body, as a part of that of the others: they are many enough.
+const REVERSE: f32 = 2.5;
 
 /// Sampling and gates of one level.
 struct Resolution {
@@ -172,31 +191,44 @@ struct Resolution {
     gate: Gate,
 }
 
+/// Body and scan as one level sees them.
+struct Sampled<'a> {
+    resolution: &'a Resolution,
+    body: Articulated,
+    scan: Cloud,
+    reverse: Samples,
+    components: usize,
+}
+
 impl Resolution {
-    fn run(
+    fn sampled(
         &self,
         model: &BodyModel,
         scan: &Mesh,
         trust: &[f32],
         settings: &FitSettings,
-        mut state: State,
-    ) -> Result<LevelResult, FittingError> {
+    ) -> Result<Sampled<'_>, FittingError> {
         let empty = || FittingError::Scan("its triangles have no area".into());
         let cloud = Cloud::new(Samples::of_mesh(scan, &scan.normals, trust, self.cell)).ok_or_else(empty)?;
-        let reverse = Samples::of_mesh(scan, &scan.normals, trust, 1.5 * self.cell);
+        let reverse = Samples::of_mesh(scan, &scan.normals, trust, REVERSE * self.cell);
         let mesh = Mesh::new(model.mean.clone(), model.triangles.clone());
         let picked = Thinned::new(&mesh, &mesh.vertex_normals(), self.body_cell, |v| !model.inner[v]);
-        let components = self.components.min(settings.components);
+        let components = self.components.min(settings.components).min(model.components.len());
         let body = Articulated::of_model(model, &picked, components);
-        state.beta.resize(components.min(model.components.len()), 0.0);
-        let columns = Columns::new(body_joints(), state.beta.len());
+        Ok(Sampled { resolution: self, body, scan: cloud, reverse, components })
+    }
+}
+
+impl Sampled<'_> {
+    fn run(&self, model: &BodyModel, settings: &FitSettings, mut state: State) -> Result<LevelResult, FittingError> {
+        state.beta.resize(self.components, 0.0);
         let level = Level {
-            body: &body,
-            scan: &cloud,
-            reverse: &reverse,
-            gate: self.gate,
-            columns,
-            iterations: self.iterations,
+            body: &self.body,
+            scan: &self.scan,
+            reverse: &self.reverse,
+            gate: self.resolution.gate,
+            columns: Columns::new(body_joints(), self.components),
+            iterations: self.resolution.iterations,
             shape_sigma: settings.shape_sigma,
             rooted: false,
         };
@@ -227,6 +259,8 @@ struct Context {
     prepared: Prepared,
     mend: Mend,
     coarse_iterations: usize,
+    landmarks: Vec<ScanLandmark>,
+    dressed: bool,
 }
 
 fn assemble(
@@ -251,7 +285,8 @@ fn assemble(
     if context.mend.rotation.angle() > 1e-9 {
         notices.push("the scan does not stand on +Y; turned upright".into());
     }
-    let mut report = judge(model, scan, trust, &fine, &conformed.points, &measurements, notices);
+    let mut report = judge(model, scan, trust, &fine, &conformed.points, &measurements, notices, context.dressed);
     report.iterations += context.coarse_iterations;
-    BodyFit { beta, pose, skeleton, body, model_mesh, mend: context.mend, measurements, report }
+    let (mend, landmarks) = (context.mend, context.landmarks);
+    BodyFit { beta, pose, skeleton, body, model_mesh, mend, landmarks, measurements, report }
 }

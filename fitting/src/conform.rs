@@ -1,5 +1,6 @@
 //! The body takes on the scan's own surface: local deformation to the closest compatible points under an elastic
-//! energy (Volino et al.'s V-Man, papers 004 §2.1.2; the mass–spring relaxation is replaced by one sparse solve).
+//! energy (Volino et al.'s V-Man, papers 004 §2.1.2; the mass–spring relaxation is replaced by one sparse solve). Landmarks
+//! carry the body along first ([`crate::mapping`]).
 //!
 //! Minimised over the displacement d of all vertices, with vertex areas M and the cotangent Laplacian C:
 //! Σ Mᵢ wᵢ |dᵢ − δᵢ|² + (C ℓ² d)ᵀ M⁻¹ (C ℓ² d) + m² dᵀ C d + ε dᵀ M d. Details finer than about six times ℓ are left
@@ -22,10 +23,14 @@ use toile_geometry::{
     mesh::{triangle_normals, vertex_normals},
 };
 
-use crate::{ConformSettings, FitSettings, FittingError, articulated::State, uncross::uncrossed};
+use crate::{
+    ConformSettings, FitSettings, FittingError, ScanLandmark, articulated::State, mapping::mapped, uncross::uncrossed,
+};
 
 /// Draws an unseen vertex back to the statistical model.
 const TIE: f64 = 2e-5;
+/// Pull of a landmark that was set by hand, against 1 of the scan.
+const ANCHOR: f64 = 300.0;
 /// Length of the membrane energy, metres: too short to smooth what was seen, enough to rule over wide holes.
 const MEMBRANE: f64 = 0.002;
 /// Least trust of a scan point that a vertex follows: what fusion closed without seeing it is no surface.
@@ -46,11 +51,14 @@ pub(crate) fn conform(
     scan: &Mesh,
     trust: &[f32],
     settings: &FitSettings,
+    landmarks: &[ScanLandmark],
 ) -> Result<Conformed, FittingError> {
-    let start = model.posed(&state.beta, &state.pose);
-    if !settings.conform {
-        return Ok(Conformed { points: start });
+    let posed = model.posed(&state.beta, &state.pose);
+    if !settings.conform || settings.dressed {
+        return Ok(Conformed { points: posed });
     }
+    let start = mapped(model, &model.shape(&state.beta), &posed, landmarks);
+    let anchors = anchors(model, landmarks);
     let surface =
         Surface { scan, trust, bvh: Bvh::new(&scan.positions, &scan.triangles), settings: &settings.conformation };
     let elastic = Elastic::new(model, &start, &settings.conformation)?;
@@ -58,18 +66,27 @@ pub(crate) fn conform(
     let mut points = start.clone();
     for _ in 0..settings.conformation.rounds {
         let normals = vertex_normals(&points, &model.triangles);
-        let pulls: Vec<Pull> = (0..points.len())
+        let mut pulls: Vec<Pull> = (0..points.len())
             .into_par_iter()
             .with_min_len(128)
             .map(|v| {
                 surface.pull(&points[v], &normals[v], freedom[v], min_cos(model.regions[v], &settings.conformation))
             })
             .collect();
+        for &(v, target) in &anchors {
+            pulls[v] = Pull { target, weight: ANCHOR };
+        }
         points = elastic.solve(&start, &pulls)?;
         release_folds(model, &start, &points, &mut freedom);
     }
-    let points = unfolded(model, &start, points);
-    Ok(Conformed { points: uncrossed(&model.triangles, &start, points) })
+    let points = unfolded(model, &posed, points);
+    Ok(Conformed { points: uncrossed(&model.triangles, &posed, points) })
+}
+
+/// Vertices of the landmarks that were set by hand and where they belong.
+fn anchors(model: &BodyModel, landmarks: &[ScanLandmark]) -> Vec<(usize, Point3<f32>)> {
+    let set = landmarks.iter().filter(|l| l.by_hand);
+    set.filter_map(|l| Some((model.landmark(&l.name)? as usize, Point3::from(l.position).cast()))).collect()
 }
 
 /// How far each vertex follows the scan, 0 to 1: fingers and face are thin or finely shaped, scans of them poor.

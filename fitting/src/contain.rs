@@ -13,6 +13,7 @@ use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals, topology::VertexNeigh
 use crate::{
     cloud::{Cloud, Samples},
     conform::unfolded,
+    uncross::uncrossed,
 };
 
 /// Scan farther than this says nothing of a vertex, metres: cloth, or another finger.
@@ -21,9 +22,10 @@ const REACH: f32 = 0.008;
 const MIN_COS: f32 = 0.3;
 /// Least trust of a scan point that a vertex must stay inside of.
 const SEEN: f32 = 0.5;
-/// How unsure the position of hands and of feet is, metres.
-const HANDS: f32 = 0.003;
-const FEET: f32 = 0.002;
+/// How far hands and feet are drawn in, in standard deviations of what is left between them and this scan.
+const DRAWN_IN: f32 = 1.5;
+/// Fewest seen vertices that such a deviation is taken from.
+const FEWEST: usize = 30;
 /// Most that one round believes of a height over the scan, metres.
 const BELIEVED: f32 = 0.002;
 /// Rounds of moving with fresh nearest points.
@@ -47,10 +49,14 @@ pub(crate) fn contained(model: &BodyModel, start: &[Point3<f32>], scan: &Mesh, t
     let most = farthest(model, start, &normals);
     let mut depth = vec![0.0f32; start.len()];
     let mut points = start.to_vec();
+    let mut margins = Margins::default();
     for round in 0..ROUNDS {
         let heights = surface.heights(model, &points, &normals);
+        if round == 0 {
+            margins = Margins::new(model, &heights);
+        }
         for (v, height) in heights.iter().enumerate() {
-            let margin = margin(model.regions[v]);
+            let margin = margins.of(model.regions[v]);
             let unseen = if round == 0 { margin } else { 0.0 };
             depth[v] += height.map_or(unseen, |h| (h.min(BELIEVED) + margin).max(0.0));
         }
@@ -59,15 +65,34 @@ pub(crate) fn contained(model: &BodyModel, start: &[Point3<f32>], scan: &Mesh, t
         points = (0..start.len()).map(|v| start[v] - normals[v] * depth[v]).collect();
     }
     draw_pockets_back(model, &mut points);
-    unfolded(model, start, points)
+    uncrossed(&model.triangles, start, unfolded(model, start, points))
 }
 
-/// How deep below the scan a vertex has to lie, metres.
-fn margin(region: Region) -> f32 {
-    match region {
-        Region::LeftHand | Region::RightHand => HANDS,
-        Region::LeftFoot | Region::RightFoot => FEET,
-        _ => 0.0,
+/// How deep below the scan the vertices of hands and feet have to lie, metres: how unsure their place is, measured on
+/// this scan.
+#[derive(Default)]
+struct Margins {
+    extremities: [f32; Region::ALL.len()],
+}
+
+impl Margins {
+    fn new(model: &BodyModel, heights: &[Option<f32>]) -> Self {
+        let mut margins = Self::default();
+        for region in [Region::LeftHand, Region::RightHand, Region::LeftFoot, Region::RightFoot] {
+            let of_region = heights.iter().zip(&model.regions).filter(|(_, r)| **r == region);
+            let mut heights: Vec<f32> = of_region.filter_map(|(h, _)| *h).collect();
+            if heights.len() >= FEWEST {
+                heights.sort_by(f32::total_cmp);
+                let at = |part: f32| heights[(part * (heights.len() - 1) as f32) as usize];
+                // half of the middle 68 %: a standard deviation that stray points do not move
+                margins.extremities[region as usize] = DRAWN_IN * 0.5 * (at(0.84) - at(0.16));
+            }
+        }
+        margins
+    }
+
+    fn of(&self, region: Region) -> f32 {
+        self.extremities[region as usize]
     }
 }
 

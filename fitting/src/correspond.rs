@@ -2,8 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
+use toile_character::Joint;
 
 use crate::{
+    FitSettings,
     articulated::{Articulated, Posed},
     cloud::{Cloud, Samples},
     equations::Residual,
@@ -22,6 +24,8 @@ pub(crate) struct Gate {
     pub kernel: f32,
     /// Standard deviation of a good residual, metres.
     pub noise: f32,
+    /// How much a vertex that lies inside the scan counts where clothes may cover it, 0–1: 1 where nobody is dressed.
+    pub inside: f64,
 }
 
 /// Residuals of both directions and how well the surfaces agree.
@@ -50,8 +54,8 @@ pub(crate) fn matches(body: &Articulated, posed: &Posed, scan: &Cloud, reverse: 
     let backward = backward(posed, reverse, gate);
     let body_area: Vec<f64> = body.areas.iter().map(|&a| f64::from(a)).collect();
     let scan_area: Vec<f64> = reverse.weights.iter().map(|&a| f64::from(a)).collect();
-    let (mut residuals, forward_misfit) = weigh(forward, &body_area, gate);
-    let (more, backward_misfit) = weigh(backward, &scan_area, gate);
+    let (mut residuals, forward_misfit) = weigh(forward, &body_area, gate, body);
+    let (more, backward_misfit) = weigh(backward, &scan_area, gate, body);
     residuals.extend(more);
     Matches { residuals, misfit: 0.5 * (forward_misfit + backward_misfit) }
 }
@@ -87,7 +91,7 @@ impl Gate {
 }
 
 /// Turns areas into weights of the normal equations; returns them with the misfit.
-fn weigh(pairs: Vec<Option<Residual>>, areas: &[f64], gate: &Gate) -> (Vec<Residual>, f64) {
+fn weigh(pairs: Vec<Option<Residual>>, areas: &[f64], gate: &Gate, body: &Articulated) -> (Vec<Residual>, f64) {
     let total: f64 = areas.iter().sum::<f64>().max(1e-12);
     let scale = 0.5 * INDEPENDENT / (total * f64::from(gate.noise).powi(2));
     let mut cost = 0.0;
@@ -98,11 +102,27 @@ fn weigh(pairs: Vec<Option<Residual>>, areas: &[f64], gate: &Gate) -> (Vec<Resid
             continue;
         };
         let squared = f64::from(r.value).powi(2);
-        cost += area * squared / (squared + f64::from(gate.kernel).powi(2));
-        r.weight *= scale * gate.robust(r.value);
+        let covered = r.value < 0.0 && gate.inside < 1.0 && !is_bare(body.main_joint(r.vertex as usize));
+        let counts = if covered { gate.inside } else { 1.0 };
+        cost += area * counts * squared / (squared + f64::from(gate.kernel).powi(2));
+        r.weight *= scale * counts * gate.robust(r.value);
         if r.weight > 0.0 {
             out.push(r);
         }
     }
     (out, cost / total)
+}
+
+/// What a vertex under cloth counts: the body lies snug within the clothes, where they are tight.
+const UNDER_CLOTH: f64 = 0.05;
+
+/// [`Gate::inside`] of a fit.
+pub(crate) fn inside(settings: &FitSettings) -> f64 {
+    if settings.dressed { UNDER_CLOTH } else { 1.0 }
+}
+
+/// Parts that clothes seldom cover: head, hands and feet.
+pub(crate) fn is_bare(joint: Joint) -> bool {
+    use Joint::*;
+    joint.is_finger() || matches!(joint, Head | LeftHand | RightHand | LeftFoot | RightFoot | LeftToes | RightToes)
 }

@@ -85,7 +85,7 @@ fn turned(
     if seen < LEAST_SEEN * body.areas.iter().sum::<f32>() {
         return Ok(state);
     }
-    let gate = Gate { distance: 0.02, slip: 0.008, min_cos: 0.4, kernel: 0.005, noise: turn.noise };
+    let gate = Gate { distance: 0.02, slip: 0.008, min_cos: 0.4, kernel: 0.005, noise: turn.noise, inside: 1.0 };
     let level = Level {
         body,
         scan: &cloud,

@@ -1,6 +1,12 @@
 //! Settings of the stages.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
+use toile_character::JointRegressor;
+
+/// Landmarks by the template's names, metres, in the scan's own frame.
+pub type HandLandmarks = BTreeMap<String, [f64; 3]>;
 
 /// Settings of [`crate::fit_body`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -8,6 +14,13 @@ use serde::{Deserialize, Serialize};
 pub struct FitSettings {
     /// Shape components used, 1 to the model's own number (the seed used 15). Default 50.
     pub components: usize,
+    /// How joints follow the shape: affine (default), or by mean value coordinates as in the seed.
+    pub joints: JointRegressor,
+    /// The person wears clothes: shape and pose are estimated from a scan that stands off, and no surface is taken
+    /// on. Default false.
+    pub dressed: bool,
+    /// Landmarks set by hand; the others are found. Default none.
+    pub landmarks: HandLandmarks,
     /// Headings tried, evenly spread over the turn, at least 1. Default 8.
     pub headings: usize,
     /// Standard deviation that the shape prior gives each coefficient; larger trusts the scan more. Default 1.
@@ -26,6 +39,9 @@ impl Default for FitSettings {
     fn default() -> Self {
         Self {
             components: 50,
+            joints: JointRegressor::Affine,
+            dressed: false,
+            landmarks: HandLandmarks::new(),
             headings: 8,
             shape_sigma: 1.0,
             noise: 0.002,

@@ -8,11 +8,11 @@ use toile_character::{BodyModel, Joint, Pose};
 use toile_geometry::Mesh;
 
 use crate::{
-    FittingError,
+    FitSettings, FittingError,
     arms::found_arms,
     articulated::{Articulated, Columns, State},
     cloud::{Cloud, Samples},
-    correspond::{Gate, matches},
+    correspond::{Gate, inside, matches},
     level::{Level, LevelResult, main_joints},
     prior::JointPrior,
     thin::Thinned,
@@ -41,14 +41,14 @@ pub(crate) fn starts(
     scan: &Mesh,
     trust: &[f32],
     ups: &[UnitQuaternion<f64>],
-    headings: usize,
+    settings: &FitSettings,
 ) -> Result<Vec<Start>, FittingError> {
     let cloud = Cloud::new(Samples::of_mesh(scan, &scan.normals, trust, 0.03)).ok_or_else(no_surface)?;
     let reverse = Samples::of_mesh(scan, &scan.normals, trust, 0.045);
     let mesh = Mesh::new(model.mean.clone(), model.triangles.clone());
     let picked = Thinned::new(&mesh, &mesh.vertex_normals(), 0.05, |v| !model.inner[v]);
     let body = Articulated::of_model(model, &picked, COARSE_COMPONENTS);
-    let gate = Gate { distance: 0.25, slip: 0.12, min_cos: 0.3, kernel: 0.06, noise: 0.02 };
+    let gate = Gate { distance: 0.25, slip: 0.12, min_cos: 0.3, kernel: 0.06, noise: 0.02, inside: inside(settings) };
     let level = Level {
         body: &body,
         scan: &cloud,
@@ -59,7 +59,7 @@ pub(crate) fn starts(
         shape_sigma: 1.0,
         rooted: false,
     };
-    let candidates = candidates(model, scan, &level, ups, headings);
+    let candidates = candidates(model, scan, &level, ups, settings.headings);
     let prior = JointPrior::standing(&model.mean_skeleton);
     let mut refined: Vec<Start> = candidates
         .into_par_iter()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use toile_character::joint::JOINTS;
 
-use crate::{BodyFit, FitReport, Mend, measure::Girth};
+use crate::{BodyFit, FitReport, Mend, ScanLandmark, measure::Girth};
 
 /// The content of `body.json`.
 #[derive(Debug, Clone, Serialize)]
@@ -24,6 +24,8 @@ pub struct BodySummary {
     pub beta: Vec<f64>,
     /// Joint angles.
     pub theta: Theta,
+    /// Landmarks on the scan, in its frame.
+    pub landmarks: Vec<ScanLandmark>,
     /// How the input was mended.
     pub mend: Mend,
     /// How good the fit is.
@@ -61,6 +63,7 @@ impl BodyFit {
                 translation: self.pose.translation.into(),
                 rotations: JOINTS.iter().map(|&j| (j.name(), self.pose.rotation(j).scaled_axis().into())).collect(),
             },
+            landmarks: self.landmarks.clone(),
             mend: self.mend,
             report: self.report.clone(),
         }

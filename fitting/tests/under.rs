@@ -6,7 +6,7 @@ use common::{joint_distance, mean_distance, person};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use toile_character::{BodyModel, Joint, Pose, Region};
 use toile_fitting::{FittingError, UnderSettings, Verdict, pose_under, settle_under};
-use toile_geometry::{Mesh, bvh::Bvh};
+use toile_geometry::{Mesh, bvh::Bvh, intersection::self_crossings};
 
 /// The same person in the next take: stepped, turned, every joint a little different.
 fn restepped(model: &BodyModel, pose: &Pose, beta: &[f64], heading: f64) -> Pose {
@@ -100,6 +100,21 @@ fn a_settled_body_lies_inside_and_keeps_its_covered_skin() {
     let (moved, all) = (moved.count(), (0..before.len()).filter(legs).count());
     assert!(moved * 10 < all, "{moved} of {all} covered vertices moved");
     assert!(settled.report.moved_most_mm < 10.0, "{:?}", settled.report);
+}
+
+#[test]
+fn settling_adds_no_crossing() {
+    let model = BodyModel::load_default().unwrap();
+    let crossings = |mesh: &Mesh| self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles));
+    for seed in [17, 18, 19] {
+        let truth = person(&model, seed, 0.0);
+        let body = model.skinned(&truth.beta);
+        let off = truth.pose.moved(&Isometry3::translation(0.002, 0.0, 0.003), &body.skeleton);
+        let settled = settle_under(&model, &body, &off, &dressed(&model, &truth.beta, &truth.pose, 0.008)).unwrap();
+        let before = crossings(&body.posed_mesh(&settled.pose));
+        let added = crossings(&settled.mesh).into_iter().filter(|pair| before.binary_search(pair).is_err()).count();
+        assert_eq!(added, 0, "seed {seed}, the posed body has {}", before.len());
+    }
 }
 
 #[test]

@@ -58,16 +58,22 @@ pub fn stance(body: &SkinnedMesh, numbers: &mut Numbers, wild: f64) -> Pose {
     pose.moved(&Isometry3::new(numbers.vector() * 0.15, heading), &body.skeleton)
 }
 
-/// What a turntable scan shows of a posed body: no soles, no pockets, patches missing until `missing` of the vertices
-/// are gone, `noise` metres along the normals.
+/// What a turntable scan shows of a posed body: no soles, no pockets, patches missing until `missing` of the surface
+/// is gone, `noise` metres along the normals.
 pub fn scanned(model: &BodyModel, body: &Mesh, missing: f64, noise: f64, numbers: &mut Numbers) -> Mesh {
     let floor = body.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
     let sole = |v: usize| body.positions[v].y < floor + 0.02 && body.normals[v].y < -0.4;
     let mut gone: Vec<bool> = (0..body.positions.len()).map(|v| model.inner[v] || sole(v)).collect();
-    let before = gone.iter().filter(|g| **g).count();
-    let goal = before + (missing * (gone.len() - before) as f64) as usize;
-    while gone.iter().filter(|g| **g).count() < goal {
-        let center = body.positions[((numbers.next() * 0.5 + 0.5) * (gone.len() - 1) as f64) as usize];
+    let areas = vertex_areas(body);
+    let left = |gone: &[bool]| areas.iter().zip(gone).filter(|a| !a.1).map(|a| a.0).sum::<f64>();
+    let whole = left(&gone);
+    while left(&gone) > (1.0 - missing) * whole {
+        let mut at = (numbers.next() * 0.5 + 0.5) * areas.iter().sum::<f64>();
+        let hit = areas.iter().position(|a| {
+            at -= a;
+            at <= 0.0
+        });
+        let center = body.positions[hit.unwrap_or(0)];
         let radius = 0.04 + 0.1 * numbers.next().abs() as f32;
         body.positions.iter().zip(&mut gone).for_each(|(p, g)| *g |= (p - center).norm() < radius);
     }
@@ -126,8 +132,23 @@ pub fn surface_distance(model: &BodyModel, a: &Mesh, b: &Mesh) -> f64 {
 
 fn one_way(model: &BodyModel, from: &Mesh, to: &Mesh) -> f64 {
     let bvh = Bvh::new(&to.positions, &to.triangles);
-    let outer = (0..from.positions.len()).step_by(2).filter(|&v| !model.inner[v]);
-    let distances: Vec<f64> =
-        outer.filter_map(|v| bvh.closest(&from.positions[v], 1.0)).map(|h| f64::from(h.distance)).collect();
-    distances.iter().sum::<f64>() / distances.len().max(1) as f64
+    let areas = vertex_areas(from);
+    let (mut sum, mut total) = (0.0, 0.0);
+    for v in (0..from.positions.len()).filter(|&v| !model.inner[v]) {
+        let distance = bvh.closest(&from.positions[v], 1.0).map_or(1.0, |h| f64::from(h.distance));
+        sum += areas[v] * distance;
+        total += areas[v];
+    }
+    sum / total
+}
+
+/// A third of the area of the triangles around each vertex, square metres.
+fn vertex_areas(mesh: &Mesh) -> Vec<f64> {
+    let mut areas = vec![0.0; mesh.positions.len()];
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = mesh.corners(t);
+        let third = f64::from((b - a).cross(&(c - a)).norm()) / 6.0;
+        triangle.iter().for_each(|&v| areas[v as usize] += third);
+    }
+    areas
 }

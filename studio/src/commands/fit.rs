@@ -9,14 +9,17 @@ use crate::{
     StudioError,
     commands::{must_exist, reach},
     outcome::Answer,
-    pipeline::{Goal, Options, Run, fit, folders::Folders},
+    pipeline::{Goal, Options, Run, fit, fit::BodyEdits, folders::Folders},
     run::Session,
 };
 
 const AFTER: &str = "\
 Examples:
   toile fit anna
-  toile fit --scan somebody.ply --out somebody";
+  toile fit --scan somebody.ply --out somebody
+  toile fit --scan in-coat.ply --out estimate --dressed
+
+Landmarks set by hand, and subjects without an undressed take: docs/edits.md.";
 
 /// Fit the body to the scan of the undressed person
 #[derive(Debug, clap::Args)]
@@ -38,6 +41,12 @@ pub struct Person {
     /// Folder of the result, with --scan
     #[arg(long, value_name = "DIR", requires = "scan")]
     pub out: Option<PathBuf>,
+    /// The person in the scan is dressed: the body under the clothes is estimated
+    #[arg(long, requires = "scan")]
+    pub dressed: bool,
+    /// Landmarks set by hand on the scan: JSON, as in docs/edits.md
+    #[arg(long, value_name = "FILE", requires = "scan")]
+    pub landmarks: Option<PathBuf>,
 }
 
 impl Person {
@@ -52,7 +61,11 @@ impl Person {
                 let answer = reach(subject, Goal::Body, &Options::default(), session)?;
                 Ok((answer, Folders::new(subject).body()))
             }
-            (None, Some(scan), Some(out)) => Ok((fit_scan(scan, out, session)?, out.clone())),
+            (None, Some(scan), Some(out)) => {
+                let mut edits = self.landmarks.as_deref().map(BodyEdits::read).transpose()?.unwrap_or_default();
+                edits.dressed |= self.dressed;
+                Ok((fit_scan(scan, out, edits, session)?, out.clone()))
+            }
             _ => Err(StudioError::Usage("give a subject, or --scan MESH with --out DIR".into())),
         }
     }
@@ -72,7 +85,7 @@ impl Fit {
 ///
 /// # Errors
 /// As [`Fit::run`].
-fn fit_scan(scan: &Path, out: &Path, session: &Session) -> Result<Answer, StudioError> {
+fn fit_scan(scan: &Path, out: &Path, edits: BodyEdits, session: &Session) -> Result<Answer, StudioError> {
     must_exist(scan)?;
     let name = scan.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let run = Run::single(scan.parent().unwrap_or(Path::new(".")), &name, &session.progress);
@@ -82,6 +95,7 @@ fn fit_scan(scan: &Path, out: &Path, session: &Session) -> Result<Answer, Studio
         folder: out.to_path_buf(),
         pose: out.join("pose.json"),
         keep_frame: false,
+        edits,
     };
     let record = fit::fit(&run, &place, &BodyModel::load_default()?)?;
     let files: Vec<PathBuf> = fit::FILES.iter().chain(&["pose.json"]).map(|f| out.join(f)).collect();

@@ -1,13 +1,14 @@
 //! Stage `fit`: the undressed scan → the body: shape, pose, own surface, weights, measures.
 //!
-//! Reads `00-body/scan.ply`. Writes `00-body/pose.json` and in `body/`: `body.ply`, `model.ply`, `rest.ply`,
+//! Reads `00-body/scan.ply` and, where there is one, `SUBJECT/edits/body.json`. Writes `00-body/pose.json` and in `body/`: `body.ply`, `model.ply`, `rest.ply`,
 //! `rigged_scan.glb`, `body.json`, `measurements.json`, `measurements.csv`, `standing.ply`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use nalgebra::Translation3;
+use nalgebra::{Point3, Translation3};
+use serde::Deserialize;
 use toile_character::BodyModel;
-use toile_fitting::{BodyFit, FitReport, FitSettings, Mend, Verdict, fit_body, measure_table, rig_scan};
+use toile_fitting::{BodyFit, FitReport, FitSettings, HandLandmarks, Mend, Verdict, fit_body, measure_table, rig_scan};
 use toile_geometry::{Mesh, Rigid, color_transfer::closest_colors, ply};
 
 use crate::{
@@ -17,7 +18,7 @@ use crate::{
 };
 
 /// Raised whenever the same scan and settings give another body.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
 
@@ -43,6 +44,46 @@ pub struct Place {
     pub pose: PathBuf,
     /// The files stay in the scan's own frame, as later stages need it; else they stand upright, in metres.
     pub keep_frame: bool,
+    /// What somebody said about the body.
+    pub edits: BodyEdits,
+}
+
+/// What is said by hand about the body: the content of `SUBJECT/edits/body.json`.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyEdits {
+    /// 1.
+    #[serde(rename = "version")]
+    _version: BodyEditsVersion,
+    /// There is no undressed take: the first one shows the person dressed, and the body is estimated.
+    #[serde(default)]
+    pub dressed: bool,
+    /// Landmarks by the template's names: metres, in the frame of the first take's scan.
+    #[serde(default)]
+    pub landmarks: HandLandmarks,
+}
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(try_from = "u32")]
+struct BodyEditsVersion;
+
+impl TryFrom<u32> for BodyEditsVersion {
+    type Error = String;
+
+    fn try_from(version: u32) -> Result<Self, String> {
+        if version == 1 { Ok(Self) } else { Err(format!("version {version}, but this program knows 1")) }
+    }
+}
+
+impl BodyEdits {
+    /// Reads a file of edits.
+    ///
+    /// # Errors
+    /// [`StudioError::Format`] where it is none, and why.
+    pub fn read(path: &Path) -> Result<Self, StudioError> {
+        let bytes = std::fs::read(path).map_err(|e| StudioError::io(path, e))?;
+        serde_json::from_slice(&bytes).map_err(|e| StudioError::format(path, format!("no edits of a body: {e}")))
+    }
 }
 
 /// Fits the body of a subject, unless that is up to date.
@@ -52,8 +93,14 @@ pub struct Place {
 pub fn run(run: &Run, model: &BodyModel) -> Result<Record, StudioError> {
     let layer = run.first_layer();
     let folders = &run.folders;
-    let place =
-        Place { scan: folders.scan(layer), folder: folders.body(), pose: folders.pose(layer), keep_frame: true };
+    let edits = Some(folders.edits("body")).filter(|p| p.exists());
+    let place = Place {
+        scan: folders.scan(layer),
+        folder: folders.body(),
+        pose: folders.pose(layer),
+        keep_frame: true,
+        edits: edits.as_deref().map(BodyEdits::read).transpose()?.unwrap_or_default(),
+    };
     fit(run, &place, model)
 }
 
@@ -62,7 +109,8 @@ pub fn run(run: &Run, model: &BodyModel) -> Result<Record, StudioError> {
 /// # Errors
 /// As [`run`].
 pub fn fit(run: &Run, place: &Place, model: &BodyModel) -> Result<Record, StudioError> {
-    let settings = FitSettings::default();
+    let (dressed, landmarks) = (place.edits.dressed, place.edits.landmarks.clone());
+    let settings = FitSettings { dressed, landmarks, ..FitSettings::default() };
     let at = |name: &str| place.folder.join(name);
     let stage = Stage {
         name: "fit",
@@ -94,6 +142,9 @@ fn back_to_the_scan(fit: &mut BodyFit, place: &Place) -> Result<(), StudioError>
     let scan_from_upright = Rigid::from_parts(Translation3::identity(), fit.mend.rotation.inverse());
     fit.pose = fit.pose.moved(&scan_from_upright, &fit.skeleton);
     fit.model_mesh = fit.model_mesh.transformed(&scan_from_upright);
+    for landmark in &mut fit.landmarks {
+        landmark.position = (scan_from_upright * Point3::from(landmark.position)).into();
+    }
     fit.mend = Mend::default();
     Ok(())
 }

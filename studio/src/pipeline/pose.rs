@@ -1,6 +1,6 @@
 //! Stage `pose`: the body inside the scan of a dressed take.
 //!
-//! Reads the scan, the scan of the take before with its pose, and the body. Writes `pose.json` and `body.ply`.
+//! Reads the scan, the scan of the take before with its pose, the pose of the first take, and the body. Writes `pose.json` and `body.ply`.
 
 use serde_json::json;
 use toile_character::BodyModel;
@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Raised whenever the same inputs and settings give another pose.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Expected seconds.
 pub const COST: f64 = 2.0;
 
@@ -40,6 +40,7 @@ pub fn run(run: &Run, n: usize, body: &Body, model: &BodyModel) -> Result<Record
             scan_path.clone(),
             folders.scan(before),
             folders.pose(before),
+            folders.pose(run.first_layer()),
             folders.body_rest(),
             folders.body_json(),
         ],
@@ -50,8 +51,10 @@ pub fn run(run: &Run, n: usize, body: &Body, model: &BodyModel) -> Result<Record
     stage.run(&run.label(layer, "pose"), run.progress, |progress| {
         let (scan, scan_before) = (run.read_mesh(&scan_path)?, run.read_mesh(&folders.scan(before))?);
         let pose_before = read_pose(&folders.pose(before))?;
+        let habit = read_pose(&folders.pose(run.first_layer()))?;
         let dressed = rigged_scan(&scan_before, &body.skinned, &pose_before);
-        let fit = pose_under(&dressed, &trust(&scan_before), &pose_before, &scan, &settings, progress)
+        // limbs are drawn to how they were seen undressed: what clothes hide goes astray a little in each take
+        let fit = pose_under(&dressed, &trust(&scan_before), &habit, &scan, &settings, progress)
             .map_err(|e| StudioError::stage(&scan_path, e))?;
         if fit.report.verdict == Verdict::Failed {
             let reason =
