@@ -85,6 +85,8 @@ pub struct StereoCamera {
     counts: PairCounts,
     next_index: u64,
     last_left: Option<u64>,
+    /// A camera failed: that was told, and nothing comes after it.
+    ended: bool,
 }
 
 impl StereoCamera {
@@ -136,7 +138,7 @@ impl StereoCamera {
             fps: settings.fps,
         };
         let rig = Rig { sensors: vec![sensor] };
-        Ok(Self { pairs, depth, rig, counts: PairCounts::default(), next_index: 0, last_left: None })
+        Ok(Self { pairs, depth, rig, counts: PairCounts::default(), next_index: 0, last_left: None, ended: false })
     }
 
     /// What became of the pictures so far.
@@ -183,7 +185,10 @@ impl StereoCamera {
                 CaptureError::Frame { index: self.next_index, reason: error.to_string() }
             }
             StereoDriverError::Recording(error) => error,
-            error => CaptureError::Device { device: self.rig.sensors[0].name.clone(), reason: error.to_string() },
+            error => {
+                self.ended = true;
+                CaptureError::Device { device: self.rig.sensors[0].name.clone(), reason: error.to_string() }
+            }
         }
     }
 }
@@ -194,7 +199,7 @@ impl Source for StereoCamera {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
-        loop {
+        while !self.ended {
             match self.pairs.next_moment().map_err(|e| self.told(e))? {
                 None => return Ok(None),
                 Some(Moment::Pair(left, right)) => {
@@ -210,5 +215,6 @@ impl Source for StereoCamera {
                 Some(Moment::Alone(Side::Right, _)) => self.counts.right_alone += 1,
             }
         }
+        Ok(None)
     }
 }
