@@ -106,7 +106,7 @@ boot() {
         -L "$rig/root/usr/share/seabios" -M q35 -accel tcg,thread=multi -cpu max,la57=off -smp 2 -m 3072 -nodefaults \
         -no-user-config -display none -no-reboot -serial "file:$rig/out/console" -monitor none \
         -kernel "$rig/kern/boot/vmlinuz-$release" -initrd "$rig/initrd.img" \
-        -append "console=ttyS0 panic=-1 quiet mitigations=off nokaslr tsc=reliable wire_frames=$frames wire_cycles=$cycles" \
+        -append "console=ttyS0 panic=-1 quiet mitigations=off nokaslr tsc=reliable no_timer_check wire_frames=$frames wire_cycles=$cycles" \
         -fsdev local,id=host,path=/,security_model=none,readonly=on,multidevs=remap \
         -device virtio-9p-pci,fsdev=host,mount_tag=host \
         -fsdev "local,id=out,path=$rig/out,security_model=none" -device virtio-9p-pci,fsdev=out,mount_tag=out || true
