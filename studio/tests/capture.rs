@@ -153,3 +153,39 @@ fn what_the_preview_cannot_keep_up_with_is_recorded_all_the_same() {
     assert_eq!((recorded.frames, Replay::open(&path).unwrap().len()), (150, 150));
     assert!(recorded.seen.fused + recorded.seen.unplaced + recorded.seen.skipped <= 150);
 }
+
+#[test]
+fn the_sensors_of_a_rig_file_record_together() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut first = toile();
+    let olga = dir.path().join("olga");
+    first.args(["capture", "--layer", "body", "--device", "synthetic:5", "--seconds", "0.9", "--subject"]).arg(&olga);
+    exits(0, &mut first);
+    let alone = olga.join("takes/00-body.mcap");
+    let recorded = frames(&alone);
+    let rig = dir.path().join("rig.toml");
+    let sensor = |name: &str, z: f64| {
+        format!(
+            "[[sensor]]\ndevice = \"replay:{}\"\nname = \"{name}\"\nposition = [0.0, 0.0, {z:?}]\n",
+            alone.display()
+        )
+    };
+    fs::write(&rig, sensor("front", 0.0) + &sensor("back", 4.0)).unwrap();
+    let anna = dir.path().join("anna");
+    let mut both = toile();
+    both.args(["capture", "--layer", "body", "--rig"]).arg(&rig).arg("--subject").arg(&anna);
+    let told = exits(0, &mut both);
+    assert_eq!(told["results"]["frames"], 2 * recorded.len());
+    let take = anna.join("takes/00-body.mcap");
+    let sensors = Replay::open(&take).unwrap().rig().sensors.clone();
+    let places: Vec<_> = sensors.iter().map(|s| (s.name.as_str(), s.rig_from_depth.translation.z)).collect();
+    assert_eq!(places, [("front", 0.0), ("back", 4.0)]);
+    for side in 0..2 {
+        let its: Vec<Frame> = frames(&take).into_iter().filter(|f| f.sensor == side).collect();
+        assert!(its.iter().zip(&recorded).all(|(a, b)| a.depth == b.depth && a.host_time_ns == b.host_time_ns));
+        assert_eq!(its.len(), recorded.len());
+    }
+    let mut wrong = toile();
+    wrong.args(["capture", "--layer", "shirt", "--rig"]).arg(dir.path().join("none.toml")).arg("--subject").arg(&anna);
+    assert!(exits(1, &mut wrong)["error"]["message"].as_str().unwrap().contains("none.toml"));
+}
