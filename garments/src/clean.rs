@@ -3,16 +3,20 @@
 use nalgebra::Point3;
 use toile_geometry::{
     Mesh,
-    topology::{boundary_loops, loop_length, vertex_components},
+    bvh::Bvh,
+    intersection::self_crossings,
+    topology::{VertexNeighbors, boundary_loops, loop_length, vertex_components},
     triangle::ray_hit,
 };
 
-use crate::{ExtractSettings, evidence::Evidence, labels::Labels, scan_graph::ScanGraph};
+use crate::{ExtractSettings, evidence::Evidence, labels::Labels, push::grow, scan_graph::ScanGraph};
 
 /// An island of old surface inside the garment is turned new up to this share of `least_area`, whatever it says.
 const ISLAND_SHARE: f32 = 0.2;
 /// Loops with more vertices than this are not closed: triangulating costs the cube.
 const MOST_RIM_VERTICES: usize = 450;
+/// Rings around the inside of a mesh that are no strip.
+const STRIP_REACH: usize = 3;
 /// A patch or hole belongs to the garment when this share of its surroundings does.
 const SURROUNDED: f64 = 0.95;
 /// Closed by fusion and within this angle (cosine) of what was worn before, a patch may be cloth: a membrane is not.
@@ -48,7 +52,7 @@ fn flip(labels: &mut Labels, v: usize) {
 /// Filled vertices take part in the garment only where no bone passes through their patch: below a skirt's hem and in a
 /// collar the scan is closed by a membrane that is no cloth. A patch that the garment surrounds belongs to it; of one
 /// that it shares with its surroundings (on top of a shoulder, beside the neck) those vertices stay that were labelled so
-/// and lie along what was worn before.
+/// and lie along what was worn before; where a bone passes through the patch elsewhere, they must lie along the body too.
 pub fn settle_filled(
     scan: &Mesh,
     graph: &ScanGraph,
@@ -75,7 +79,11 @@ pub fn settle_filled(
         let [old, new] = around[patch[v] as usize];
         let surrounded = f64::from(new) > SURROUNDED * f64::from(old + new);
         let along = evidence.facing[v] > ALONG && evidence.height[v].abs() < NEAR;
-        labels.garment[v] = !passed[patch[v] as usize] && (surrounded || (labels.garment[v] && along));
+        let along_body = evidence.body_facing[v] > ALONG && evidence.body_distance[v] < 2.0 * NEAR;
+        labels.garment[v] = match passed[patch[v] as usize] {
+            true => labels.garment[v] && along && along_body,
+            false => surrounded || (labels.garment[v] && along),
+        };
     }
 }
 
@@ -103,6 +111,38 @@ pub fn keep_large_pieces(mesh: &Mesh, share: f32) -> Mesh {
     }
     let largest = areas.iter().copied().fold(0.0, f32::max);
     mesh.filter_triangles(|t| areas[set[mesh.triangles[t][0] as usize] as usize] >= share * largest).0
+}
+
+/// The mesh without strips of a few triangles' width: threads that fusion spun across an opening. What lies within
+/// [`STRIP_REACH`] rings of a vertex further than one ring from every rim stays.
+pub fn drop_strips(mesh: &Mesh) -> Mesh {
+    let neighbors = VertexNeighbors::new(mesh.positions.len(), &mesh.triangles);
+    let rims: Vec<u32> = boundary_loops(&mesh.triangles).concat();
+    let mut inner = vec![true; mesh.positions.len()];
+    grow(rims, &neighbors, 1).iter().for_each(|&v| inner[v as usize] = false);
+    let core: Vec<u32> = (0..mesh.positions.len() as u32).filter(|&v| inner[v as usize]).collect();
+    let mut kept = vec![false; mesh.positions.len()];
+    grow(core, &neighbors, STRIP_REACH).iter().for_each(|&v| kept[v as usize] = true);
+    mesh.filter_triangles(|t| mesh.triangles[t].iter().all(|&v| kept[v as usize])).0
+}
+
+/// Cuts away, with a ring of triangles, what crosses itself within `depth` metres of a rim: crumpled membrane that
+/// fusion drew into a sleeve or behind a hem. Returns whether anything was cut.
+pub fn cut_crumpled(mesh: &mut Mesh, depth: f32) -> bool {
+    let pairs = self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles));
+    let rims: Vec<Point3<f32>> =
+        boundary_loops(&mesh.triangles).iter().flatten().map(|&v| mesh.positions[v as usize]).collect();
+    let at_rim = |t: &u32| {
+        let corner = mesh.corners(*t as usize)[0];
+        rims.iter().any(|p| (p - corner).norm() < depth)
+    };
+    let crumpled: Vec<u32> = pairs.into_iter().flatten().filter(at_rim).collect();
+    let mut cut = vec![false; mesh.positions.len()];
+    crumpled.iter().flat_map(|&t| mesh.triangles[t as usize]).for_each(|v| cut[v as usize] = true);
+    if !crumpled.is_empty() {
+        *mesh = mesh.filter_triangles(|t| mesh.triangles[t].iter().all(|&v| !cut[v as usize])).0;
+    }
+    !crumpled.is_empty()
 }
 
 /// Closes boundary loops up to `longest` (metres) unless one of `bones` passes through them. New triangles are few;
@@ -204,6 +244,23 @@ mod tests {
         assert!(Edges::new(&mesh.triangles).is_closed());
         let volume = mesh.signed_volume();
         assert!((volume - 0.1 * 12.0 * 0.5 * 0.0009 * 0.5).abs() < 1e-5, "{volume}");
+    }
+
+    #[test]
+    fn a_thread_across_a_hole_is_dropped_and_the_sheet_stays() {
+        let n = 31u32;
+        let at = |i: u32| Point3::new((i % n) as f32 * 0.006, (i / n) as f32 * 0.006, 0.0);
+        let triangles = (0..n - 1)
+            .flat_map(|j| (0..n - 1).map(move |i| j * n + i))
+            .flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]])
+            .collect();
+        let sheet = Mesh::new((0..n * n).map(at).collect(), triangles);
+        // No more than the tips of its corners is lost.
+        assert!(drop_strips(&sheet).triangles.len() + 4 >= sheet.triangles.len());
+        let far = |p: &Point3<f32>| (p - Point3::new(0.09, 0.09, 0.0)).norm() > 0.05 || (p.x - 0.09).abs() < 0.007;
+        let (threaded, _) = sheet.filter_triangles(|t| sheet.corners(t).iter().all(far));
+        assert_eq!(boundary_loops(&threaded.triangles).len(), 3);
+        assert_eq!(boundary_loops(&drop_strips(&threaded).triangles).len(), 2);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use toile_geometry::{
-    intersection::{crossings, segment_crosses},
+    intersection::{crossings, crossings_among, segment_crosses},
     triangle::ray_hit,
 };
 
@@ -104,7 +104,25 @@ impl Contacts {
     /// Contacts wherever an edge of a layer passes through a triangle of another; the upper has to move by `distance`
     /// along the lower one's normal.
     pub fn crossings(&self, surfaces: &[WornSurface], distance: f32) -> Vec<Contact> {
-        self.pairs.iter().flat_map(|pair| crossing_contacts(surfaces, [pair.upper, pair.lower], distance)).collect()
+        self.pairs.iter().flat_map(|pair| pair.crossings(surfaces, distance)).collect()
+    }
+}
+
+impl Pair {
+    fn crossings(&self, surfaces: &[WornSurface], distance: f32) -> Vec<Contact> {
+        crossing_contacts(surfaces, [self.upper, self.lower], &self.near(surfaces), distance)
+    }
+
+    /// Upper triangles that may cross the lower surface: one with all corners further from it than its longest side
+    /// is cannot.
+    fn near(&self, surfaces: &[WornSurface]) -> Vec<u32> {
+        let mesh = &surfaces[self.upper].mesh;
+        let may = |t: &u32| {
+            let [a, b, c] = mesh.corners(*t as usize);
+            let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared()).sqrt();
+            mesh.triangles[*t as usize].iter().any(|&v| self.vertices[v as usize] < longest)
+        };
+        (0..mesh.triangles.len() as u32).filter(may).collect()
     }
 }
 
@@ -204,10 +222,15 @@ fn probe(
     (0.0, Some(Contact { upper, lower, by }))
 }
 
-fn crossing_contacts(surfaces: &[WornSurface], [upper, lower]: [usize; 2], distance: f32) -> Vec<Contact> {
+fn crossing_contacts(
+    surfaces: &[WornSurface],
+    [upper, lower]: [usize; 2],
+    some: &[u32],
+    distance: f32,
+) -> Vec<Contact> {
     let (over, under) = (&surfaces[upper], &surfaces[lower]);
     let mut contacts = Vec::new();
-    for [t, u] in crossings(&over.mesh, &under.mesh, &under.bvh) {
+    for [t, u] in crossings_among(&over.mesh, some, &under.mesh, &under.bvh) {
         let (x, y) = (over.mesh.corners(t as usize), under.mesh.corners(u as usize));
         let by = under.smooth_normal(u, [1.0 / 3.0; 3]) * distance;
         let on_lower = Anchor { surface: lower, corners: under.mesh.triangles[u as usize], weights: [1.0 / 3.0; 3] };

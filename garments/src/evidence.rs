@@ -45,6 +45,8 @@ pub struct Evidence {
     pub parts: Vec<[f32; PART_COUNT]>,
     /// Distance from the body, metres.
     pub body_distance: Vec<f32>,
+    /// Cosine between the scan's normal and the body's at the closest place.
+    pub body_facing: Vec<f32>,
     /// Laplacian scale of `height` on uncovered parts, metres.
     pub height_noise: f32,
     /// Exponential scale of `color` on uncovered parts.
@@ -61,21 +63,26 @@ pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Ev
     let column = |k: usize| compared.iter().map(|row| row[k]).collect::<Vec<f32>>();
     let body = Bvh::new(&take.body.positions, &take.body.triangles);
     let shares = part_shares(take.weights);
-    let (parts, body_distance): (Vec<_>, Vec<f32>) = take
+    let body_normals = take.body.triangle_normals();
+    let (parts, on_body): (Vec<_>, Vec<[f32; 2]>) = take
         .scan
         .positions
         .par_iter()
-        .map(|p| match body.closest(p, f32::INFINITY) {
+        .zip(&graph.normals)
+        .map(|(p, normal)| match body.closest(p, f32::INFINITY) {
             Some(hit) => {
                 let corners = take.body.triangles[hit.triangle as usize];
-                (blend(&shares, corners, hit.barycentric), hit.distance)
+                let facing = body_normals[hit.triangle as usize].dot(normal);
+                (blend(&shares, corners, hit.barycentric), [hit.distance, facing])
             }
-            None => ([0.0; PART_COUNT], f32::INFINITY),
+            None => ([0.0; PART_COUNT], [f32::INFINITY, 0.0]),
         })
         .unzip();
+    let (body_distance, body_facing) = on_body.into_iter().map(|[distance, facing]| (distance, facing)).unzip();
     let color = column(1).into_iter().zip(&graph.filled).map(|(c, &f)| if f > 0.5 { f32::NAN } else { c }).collect();
     let (height, facing) = (column(0), column(2));
-    let mut evidence = Evidence { height, color, facing, parts, body_distance, height_noise: 0.0, color_noise: 0.0 };
+    let mut evidence =
+        Evidence { height, color, facing, parts, body_distance, body_facing, height_noise: 0.0, color_noise: 0.0 };
     evidence.estimate_noise();
     evidence
 }

@@ -16,6 +16,7 @@ use crate::{
     clean, common_frame, cut,
     edits::{Applied, Edits},
     evidence::{self, Evidence},
+    hanging::{FREE_PART, mark_free},
     hem,
     labels::{self, Labels},
     rim,
@@ -39,6 +40,10 @@ pub(crate) const LEGS_APART: f32 = 0.2;
 const FREE: &str = "unseen_around";
 /// Rims with fewer vertices are small holes, and left as they are.
 const LEAST_RIM: usize = 20;
+/// What crosses itself this near to a rim, and cannot be smoothed apart, is cut away, metres.
+const CRUMPLED: f32 = 0.04;
+/// Rounds of that.
+const CRUMPLED_ROUNDS: usize = 4;
 /// Labels less sure than this are marked as unsure.
 const UNSURE: f32 = 0.7;
 
@@ -95,7 +100,8 @@ impl std::fmt::Display for Warning {
 pub struct Extraction {
     /// Labels of the scan's vertices.
     pub labels: Labels,
-    /// The garment in the take's pose and frame; attributes `confidence`, `filled`. Empty where nothing new was found.
+    /// The garment in the take's pose and frame; attributes `confidence`, `filled`, and for skirts and dresses
+    /// [`FREE_PART`]. Empty where nothing new was found.
     pub in_take: Mesh,
     /// The same vertices in the common frame: take 0's pose.
     pub garment: Mesh,
@@ -149,12 +155,15 @@ pub fn extract(
     let (garment_type, mut labels) = label(take, &graph, &evidence, settings);
     clean::drop_islands(&graph, &mut labels, settings);
     clean::settle_filled(take.scan, &graph, &evidence, &mut labels, &bones(take));
-    take_off_steps(take, &graph, &evidence, &mut labels, settings);
+    take_off_steps(take, &graph, &evidence, &mut labels, garment_type, settings);
     clean::settle_filled(take.scan, &graph, &evidence, &mut labels, &bones(take));
     let pieces = clean::drop_islands(&graph, &mut labels, settings);
     progress(0.6);
     let applied = take.edits.map(|e| e.apply(take.scan, &graph, &evidence, &mut labels, settings));
-    let in_take = garment_mesh(take, &graph, &labels, applied.as_ref(), settings);
+    let mut in_take = garment_mesh(take, &graph, &labels, applied.as_ref(), settings);
+    if matches!(garment_type, GarmentType::Skirt | GarmentType::Dress) && !in_take.is_empty() {
+        in_take.attributes.insert(FREE_PART.into(), mark_free(take.body, &in_take));
+    }
     progress(0.8);
     let weights = common_frame::weights(take, &in_take, settings);
     let garment = common_frame::to_common_frame(take, &in_take, &weights);
@@ -201,10 +210,12 @@ fn take_off_steps(
     graph: &ScanGraph,
     evidence: &Evidence,
     labels: &mut Labels,
+    garment_type: GarmentType,
     settings: &ExtractSettings,
 ) {
     let colors = labels::color_model(graph, labels);
-    hem::lower_steps(take.scan, graph, evidence, labels, &colors, settings);
+    let facing = garment_type == GarmentType::Jacket;
+    hem::lower_steps(take.scan, graph, evidence, labels, &colors, facing, settings);
     labels::relabel(graph, evidence, labels, settings);
 }
 
@@ -325,8 +336,16 @@ fn garment_mesh(
     rim::extend(&mut mesh, FREE, settings.edge_loss);
     mesh.attributes.remove(FREE);
     mesh = remesh::isotropic(&mesh, settings.edge_length);
+    mesh = clean::keep_large_pieces(&clean::drop_strips(&mesh), settings.piece_share);
     rim::smooth(&mut mesh, settings.rim_smoothing, LEAST_RIM);
-    untangle::untangle(&mut mesh);
+    for _ in 0..CRUMPLED_ROUNDS {
+        if untangle::untangle(&mut mesh) == 0 || !clean::cut_crumpled(&mut mesh, CRUMPLED) {
+            break;
+        }
+        mesh = clean::keep_large_pieces(&mesh, settings.piece_share);
+        clean::fill_holes(&mut mesh, &bones, settings.hole_rim);
+        rim::smooth(&mut mesh, settings.rim_smoothing, LEAST_RIM);
+    }
     mesh.recompute_normals();
     mesh
 }

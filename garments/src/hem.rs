@@ -33,20 +33,23 @@ const LIP_DROP: f32 = 0.002;
 /// Cloth behind a hem must have this area to be believed, square metres.
 const LEAST_BEHIND: f32 = 5e-5;
 
-/// Lowers the log odds of the steps at the garment's border.
+/// Lowers the log odds of the steps at the garment's border. Where it has a `facing` (jackets and coats), what has the
+/// garment's colour past a fold is its turned-in edge and stays.
 pub fn lower_steps(
     scan: &Mesh,
     graph: &ScanGraph,
     evidence: &Evidence,
     labels: &mut Labels,
     color_odds: &[f32],
+    facing: bool,
     settings: &ExtractSettings,
 ) {
     let depth = settings.hem_depth;
     let reached = border_distance(scan, graph, labels, depth);
     let steps = step_vertices(graph, evidence, labels, color_odds, &reached);
     let slopes = slope_vertices(scan, graph, evidence, labels, &reached, depth);
-    let lips = lip_vertices(scan, graph, labels, &reached, depth);
+    let turned_in = |v: &u32| facing && color_odds[*v as usize] > STEP_COLOR && graph.filled[*v as usize] < 0.5;
+    let lips = lip_vertices(scan, graph, labels, &reached, depth).into_iter().filter(|v| !turned_in(v));
     for v in steps.into_iter().chain(slopes).chain(lips) {
         labels.log_odds[v as usize] = labels.log_odds[v as usize].min(SLOPE_ODDS);
     }

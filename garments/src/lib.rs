@@ -8,11 +8,13 @@
 //! 3. [`hem`], [`cut`], [`clean`] and [`rim`]: the garment's own mesh, cut through triangles along a smooth hem, islands dropped, holes
 //!    closed;
 //! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
-//! 5. [`mod@stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests.
+//! 5. [`mod@stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests;
+//! 6. [`layer_weights`]: layers close over one another move alike; [`posed`] tells what they do in other poses.
 //!
 //! [`edits`] are corrections by hand, applied to the labels each time.
 //!
-//! [`extract`](extract::extract) runs 1 to 4 for one take; [`stack`](stack::stack) runs 5 over all layers.
+//! [`extract`](extract::extract) runs 1 to 4 for one take; [`stack`](stack::stack) runs 5 and
+//! [`carry_weights`] 6 over all layers.
 //!
 //! ```
 //! use toile_garments::GarmentType;
@@ -25,13 +27,17 @@ pub mod color;
 pub mod common_frame;
 pub mod contacts;
 pub mod cut;
+pub mod cut_rest;
 pub mod edits;
 pub mod error;
 pub mod evidence;
 pub mod extract;
 pub mod garment_type;
+pub mod hanging;
 pub mod hem;
 pub mod labels;
+pub mod layer_weights;
+pub mod posed;
 pub mod push;
 pub mod rim;
 pub mod scan_graph;
@@ -45,5 +51,7 @@ pub use edits::Edits;
 pub use error::GarmentError;
 pub use extract::{Extraction, Take, Warning, extract};
 pub use garment_type::GarmentType;
+pub use layer_weights::carry_weights;
+pub use posed::{PosedReport, Worn, posed_report};
 pub use settings::{ExtractSettings, StackSettings};
 pub use stack::{GAP_BINS_MM, LayerReport, StackReport, stack};

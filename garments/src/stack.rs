@@ -5,16 +5,18 @@
 //! layer's vertices, and the points where edges still cross. A round moves all layers together by the displacement
 //! field d that minimises Σ (d(point) − push)² · stiff + ∫ |∇d|² + |d|² / spread²; of what a pair has to move apart the
 //! lower layer takes a share at first, so that what was scanned last is not the only one to give way, and later none.
-//! Where that does not help, the layers are crumpled there: they are smoothed around the place, wider each time.
+//! Where that does not help, the layers are crumpled there: they are smoothed around the place, wider each time. The
+//! few triangles that cross even then are cut out of the upper layer.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
-use toile_geometry::{Mesh, bvh::Bvh, intersection::self_crossings};
+use toile_geometry::{Mesh, intersection::self_crossings};
 
 use crate::{
     GarmentError, StackSettings,
     contacts::{Contact, Contacts, crossing_pairs},
+    cut_rest::cut_rest,
     push::{Cloth, Push, grow},
     untangle::{smooth, untangle},
     worn_surface::WornSurface,
@@ -48,6 +50,8 @@ pub struct LayerReport {
     pub settled: bool,
     /// Pairs of crossing triangles with any lower layer after the last round.
     pub crossing_pairs: usize,
+    /// Triangles that were cut out because they crossed to the last.
+    pub cut_triangles: usize,
     /// Pairs of triangles of the layer itself that cross, before and after.
     pub self_crossings: [usize; 2],
     /// Least height of the layer's vertices over any lower layer, metres.
@@ -86,26 +90,32 @@ pub fn stack(
     for mesh in std::iter::once(body).chain(layers.iter()) {
         mesh.validate().map_err(|e| GarmentError::Mesh(format!("a layer to stack: {e}")))?;
     }
-    let own_before: Vec<usize> = layers.iter().map(own_crossings).collect();
     let mut pile = Pile::new(body, layers);
+    let own_before: Vec<Vec<[u32; 2]>> = pile.surfaces[1..].iter().map(own_crossings).collect();
     let (rounds, left) = pile.part(settings, progress);
     let mut report = StackReport::default();
     for (k, layer) in layers.iter_mut().enumerate() {
-        let start = std::mem::replace(&mut layer.positions, pile.surfaces[k + 1].mesh.positions.clone());
+        let cut_triangles = cut_rest(&mut pile.surfaces, k + 1, &own_before[k]);
+        let stacked = &pile.surfaces[k + 1];
+        layer.triangles.clone_from(&stacked.mesh.triangles);
+        let start = std::mem::replace(&mut layer.positions, stacked.mesh.positions.clone());
         let moved: Vec<f32> = layer.positions.iter().zip(&start).map(|(a, b)| (a - b).norm()).collect();
         let crossing = crossing_pairs(&pile.surfaces, k + 1);
         let mut told = LayerReport {
             rounds,
             settled: crossing == 0 && left.iter().all(|c| c.upper.surface != k + 1),
             crossing_pairs: crossing,
-            self_crossings: [own_before[k], own_crossings(layer)],
+            cut_triangles,
+            self_crossings: [own_before[k].len(), own_crossings(stacked).len()],
             ..LayerReport::default()
         };
         told.read_gaps(&pile.surfaces[..=k + 1], settings);
         told.read_moves(layer, moved);
         report.layers.push(told);
-        if layer.positions != start {
+        if layer.positions != start || cut_triangles > 0 {
             layer.recompute_normals();
+            // Vertices that lost all their triangles keep some direction.
+            layer.normals.iter_mut().filter(|n| n.norm_squared() == 0.0).for_each(|n| *n = Vector3::y());
         }
     }
     Ok(report)
@@ -265,8 +275,8 @@ impl Patience {
     }
 }
 
-fn own_crossings(mesh: &Mesh) -> usize {
-    self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles)).len()
+fn own_crossings(surface: &WornSurface) -> Vec<[u32; 2]> {
+    self_crossings(&surface.mesh, &surface.bvh)
 }
 
 impl LayerReport {

@@ -3,7 +3,7 @@
 use toile_geometry::{
     Mesh,
     bvh::Bvh,
-    intersection::self_crossings,
+    intersection::{self_crossings, self_crossings_among},
     topology::{Edges, VertexNeighbors},
 };
 
@@ -18,18 +18,26 @@ const STEPS: usize = 4;
 
 /// Smooths around the triangles of `mesh` that cross one another. Returns how many pairs are left.
 pub fn untangle(mesh: &mut Mesh) -> usize {
-    let mut neighbors = None;
-    for round in 0..=ROUNDS {
-        let pairs = self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles));
-        if pairs.is_empty() || round == ROUNDS {
-            return pairs.len();
-        }
-        let neighbors = neighbors.get_or_insert_with(|| VertexNeighbors::new(mesh.positions.len(), &mesh.triangles));
-        let seeds = pairs.iter().flatten().flat_map(|&t| mesh.triangles[t as usize]);
-        let patch = grow(seeds.collect(), neighbors, RINGS + round / 3);
-        smooth(mesh, neighbors, &patch, STEPS);
+    let mut pairs = self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles));
+    if pairs.is_empty() {
+        return 0;
     }
-    0
+    let neighbors = VertexNeighbors::new(mesh.positions.len(), &mesh.triangles);
+    for round in 0..ROUNDS {
+        let seeds = pairs.iter().flatten().flat_map(|&t| mesh.triangles[t as usize]);
+        let patch = grow(seeds.collect(), &neighbors, RINGS + round / 3);
+        smooth(mesh, &neighbors, &patch, STEPS);
+        // Only what moved can cross anew, and all that crossed has moved.
+        let mut moved = vec![false; mesh.positions.len()];
+        patch.iter().for_each(|&v| moved[v as usize] = true);
+        let of_patch = |t: &u32| mesh.triangles[*t as usize].iter().any(|&v| moved[v as usize]);
+        let some: Vec<u32> = (0..mesh.triangles.len() as u32).filter(of_patch).collect();
+        pairs = self_crossings_among(mesh, &some, &Bvh::new(&mesh.positions, &mesh.triangles));
+        if pairs.is_empty() {
+            break;
+        }
+    }
+    pairs.len()
 }
 
 /// Moves each vertex of the patch halfway to its neighbours' mean, `steps` times; vertices of a rim heed only the rim.

@@ -407,3 +407,24 @@ fn two_garments_at_once_are_one_layer_with_a_warning() {
     assert_eq!((found.report.pieces, &found.warnings[..]), (2, &[Warning::TwoAtOnce][..]));
     assert_eq!(boundary_loops(&found.garment.triangles).len(), 4);
 }
+
+#[test]
+fn a_bare_arm_that_touches_the_torso_is_no_cloth() {
+    let angle = |p: &Point3<f32>| p.x.atan2(p.z).rem_euclid(std::f32::consts::TAU);
+    // The arm is a ridge on the torso's side, a part of the same surface.
+    let arm = |y: f32, a: f32| (0.4..0.9).contains(&y) && (a - 1.6).abs() < 0.45;
+    let bulge = |y: f32, a: f32| if arm(y, a) { 0.06 * (1.0 - ((a - 1.6) / 0.45).powi(2)).sqrt() } else { 0.0 };
+    let cloth = |y: f32, a: f32| inside(y) && !arm(y, a);
+    let before = column(|y, a| RADIUS + bulge(y, a), |_| SKIN);
+    let thick = |y: f32, a: f32| if cloth(y, a) { 0.008 } else { 0.0 };
+    let mut scan = column(|y, a| RADIUS + bulge(y, a) + noise(y, a) + thick(y, a), |_| SKIN);
+    for v in 0..scan.positions.len() {
+        let p = scan.positions[v];
+        scan.colors[v] = if cloth(p.y, angle(&p)) { BLUE } else { SKIN };
+    }
+    let person = Person { body: before.clone(), ..person() };
+    let pose = Pose::identity();
+    let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    let iou = iou_of(&scan, &found.labels.garment, |p| cloth(p.y, angle(p)));
+    assert!(iou > 0.96, "{iou}");
+}

@@ -55,6 +55,21 @@ pub fn self_crossings(mesh: &Mesh, bvh: &Bvh) -> Vec<[u32; 2]> {
     })
 }
 
+/// As [`self_crossings`], of pairs that have one of `some` triangles or two.
+pub fn self_crossings_among(mesh: &Mesh, some: &[u32], bvh: &Bvh) -> Vec<[u32; 2]> {
+    let mut pairs = collect(some, |t, found| {
+        let x = mesh.corners(t as usize);
+        visit_sorted(bvh, &x, |u| {
+            if u != t && neighbours_cross(mesh, t, u) {
+                found.push([t.min(u), t.max(u)]);
+            }
+        });
+    });
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
 fn neighbours_cross(mesh: &Mesh, t: u32, u: u32) -> bool {
     let (ti, ui) = (mesh.triangles[t as usize], mesh.triangles[u as usize]);
     let (x, y) = (mesh.corners(t as usize), mesh.corners(u as usize));
@@ -92,6 +107,23 @@ fn collect(triangles: &[u32], of: impl Fn(u32, &mut Vec<[u32; 2]>) + Sync) -> Ve
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn crossings_among_some_are_those_of_all_that_have_one_of_them() {
+        let mut seed = 7u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / 16_777_216.0
+        };
+        let positions = (0..120).map(|_| Point3::new(random(), random(), random())).collect();
+        let mesh = Mesh::new(positions, (0..40).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect());
+        let bvh = Bvh::new(&mesh.positions, &mesh.triangles);
+        let some: Vec<u32> = (0..40).filter(|t| t % 3 == 0).collect();
+        let all = self_crossings(&mesh, &bvh);
+        let expected: Vec<[u32; 2]> = all.iter().filter(|p| p.iter().any(|t| t % 3 == 0)).copied().collect();
+        assert!(expected.len() > 5 && expected.len() < all.len());
+        assert_eq!(self_crossings_among(&mesh, &some, &bvh), expected);
+    }
 
     fn triangle(p: [[f32; 3]; 3]) -> [Point3<f32>; 3] {
         p.map(Point3::from)

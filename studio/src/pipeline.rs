@@ -125,7 +125,7 @@ fn dress(
             Err(error) => return Err(error),
         }
     }
-    summary.add("layers", "stack", stack::run(run)?);
+    summary.add("layers", "stack", stack::run(run, &body)?);
     if goal >= Goal::Avatar {
         summary.add("avatar", "export", deliverables::run(run, &body, options.motion.as_deref())?);
     }

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Raised whenever the same inputs and settings give other files.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Expected seconds.
 pub const COST: f64 = 0.5;
 
@@ -27,7 +27,7 @@ pub const COST: f64 = 0.5;
 pub fn run(run: &Run, body: &Body, bvh: Option<&Path>) -> Result<Record, StudioError> {
     let folders = &run.folders;
     let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
-    inputs.extend(run.garments().flat_map(|l| [folders.garment(l), folders.unstacked(l)]));
+    inputs.extend(run.garments().map(|l| folders.garment(l)));
     inputs.extend(bvh.map(Path::to_path_buf));
     let types: Vec<Option<String>> = (0..run.layers.len()).map(|n| garment_type(run, n)).collect();
     let stage = Stage {
@@ -93,10 +93,10 @@ fn dressed(run: &Run, body: &Body, types: &[Option<String>]) -> Result<Avatar, S
     let weights = body.skinned.weights.clone();
     let mut layers = vec![AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None }];
     for (n, layer) in run.layers.iter().enumerate().filter(|(_, l)| run.garments().any(|g| g == l.as_str())) {
-        let path = folders.unstacked(layer);
-        let weights = take_weights(&mut run.read_mesh(&path)?)
+        let path = folders.garment(layer);
+        let mut mesh = run.read_mesh(&path)?;
+        let weights = take_weights(&mut mesh)
             .ok_or_else(|| StudioError::format(&path, "has no skin weights; delete it and run again"))?;
-        let mesh = run.read_mesh(&folders.garment(layer))?;
         let garment = types[n].clone();
         layers.push(AvatarLayer { name: layer.clone(), mesh, weights, order: n as u32, garment, thickness: None });
     }

@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Raised whenever the page looks different.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
 /// Times of the motion that are shown.
@@ -37,7 +37,7 @@ pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Res
     let garments: Vec<&str> = run.garments().collect();
     let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.measurements(), folders.glb()];
     inputs.extend(run.layers.iter().map(|l| folders.scan(l)));
-    inputs.extend(garments.iter().flat_map(|l| [folders.garment(l), folders.unstacked(l)]));
+    inputs.extend(garments.iter().map(|l| folders.garment(l)));
     let said = json!([summary.warnings, summary.lost, summary.failures, run.layers, run.title()]);
     let stage = Stage {
         name: "report",
@@ -71,7 +71,11 @@ fn contents(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Re
     };
     let takes: Vec<&str> = run.layers.iter().map(String::as_str).collect();
     let worn: Vec<&str> = run.garments().collect();
-    let garments = read_all(&worn, &|l| folders.garment(l))?;
+    let mut garments = read_all(&worn, &|l| folders.garment(l))?;
+    let taken = |(layer, mesh): &mut (String, Mesh)| {
+        take_weights(mesh).ok_or_else(|| StudioError::format(&folders.garment(layer), "has no skin weights; delete it"))
+    };
+    let weights: Vec<SkinWeights> = garments.iter_mut().map(taken).collect::<Result<_, _>>()?;
     let body_mesh = run.read_mesh(&folders.body_mesh())?;
     let moved = motion::load(bvh, &body.skinned.skeleton)?.motion;
     let table: MeasureTable = read_json(&folders.measurements())?;
@@ -86,9 +90,10 @@ fn contents(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Re
         lost: summary.lost.clone(),
         failures: summary.failures.clone(),
         scans: read_all(&takes, &|l| folders.scan(l))?,
-        motion: motion_frames(run, body, &body_mesh, &garments, &moved)?,
+        motion: motion_frames(body, &body_mesh, &garments, weights, &moved),
         body: body_mesh,
         gaps: gaps(&worn, summary),
+        stacked: stacked(&worn, summary),
         garments,
         seconds: seconds(run),
     })
@@ -99,6 +104,27 @@ fn gaps(garments: &[&str], summary: &Summary) -> Vec<(String, Vec<f64>)> {
     let stacked = summary.stages.iter().find(|s| s.0 == "layers/stack").map_or(Value::Null, |s| s.1.result.clone());
     let shares = |k: usize| stacked["layers"][k]["gaps"].as_array().into_iter().flatten().filter_map(Value::as_f64);
     garments.iter().enumerate().map(|(k, l)| (l.to_string(), shares(k).collect())).collect()
+}
+
+/// How far stacking moved each garment, and what is left of crossings: then and in the walk.
+fn stacked(garments: &[&str], summary: &Summary) -> Vec<Vec<String>> {
+    let found = summary.stages.iter().find(|s| s.0 == "layers/stack").map_or(Value::Null, |s| s.1.result.clone());
+    let text = |value: &Value, scale: f64, digits: usize| {
+        value.as_f64().map_or("–".into(), |x| format!("{:.digits$}", scale * x))
+    };
+    let row = |(k, layer): (usize, &&str)| {
+        let (rest, walk) = (&found["layers"][k], &found["walking"][k]);
+        vec![
+            layer.to_string(),
+            text(&rest["moved_seen_mean_m"], 1e3, 2),
+            text(&rest["moved_seen_p95_m"], 1e3, 2),
+            text(&rest["least_gap_m"], 1e3, 1),
+            text(&rest["crossing_pairs"], 1.0, 0),
+            text(&walk["crossing_pairs_mean"], 1.0, 0),
+            text(&walk["stretch_most"], 1.0, 1),
+        ]
+    };
+    garments.iter().enumerate().map(row).collect()
 }
 
 /// What each take's records say, in figures.
@@ -139,19 +165,15 @@ fn measurement_rows(table: &MeasureTable) -> Vec<(String, String)> {
 
 /// All layers at a few times of the motion.
 fn motion_frames(
-    run: &Run,
     body: &Body,
     body_mesh: &Mesh,
     garments: &[(String, Mesh)],
+    weights: Vec<SkinWeights>,
     motion: &Motion,
-) -> Result<Vec<(String, Vec<Mesh>)>, StudioError> {
+) -> Vec<(String, Vec<Mesh>)> {
     let skeleton = &body.skinned.skeleton;
     let mut layers: Vec<(&Mesh, SkinWeights)> = vec![(body_mesh, body.skinned.weights.clone())];
-    for (layer, mesh) in garments {
-        let path = run.folders.unstacked(layer);
-        let weights = take_weights(&mut run.read_mesh(&path)?);
-        layers.push((mesh, weights.ok_or_else(|| StudioError::format(&path, "has no skin weights; delete it"))?));
-    }
+    layers.extend(garments.iter().map(|g| &g.1).zip(weights));
     let rest_from_pose0 = body.pose0.skinning_transforms(skeleton);
     let rest: Vec<_> = layers.iter().map(|(mesh, w)| skinning::unskin(&mesh.positions, w, &rest_from_pose0)).collect();
     let count = motion.poses.len();
@@ -167,7 +189,7 @@ fn motion_frames(
         });
         (format!("{} at {:.1} s", motion.name, k as f64 * motion.frame_time), posed.collect())
     };
-    Ok(shown.map(frame).collect())
+    shown.map(frame).collect()
 }
 
 /// Seconds by folder and stage, as the timings files say.

@@ -1,30 +1,41 @@
 //! Stage `stack`: every garment outside the body and all garments below it.
 //!
-//! Reads `body/body.ply` and each `unstacked.ply`. Writes each `garment.ply`, in scan 0's pose and frame.
+//! Reads the body and each `unstacked.ply`. Writes each `garment.ply`, in scan 0's pose and frame, with its skin weights
+//! as vertex attributes; layers that lie close over one another have like weights.
 
-use toile_garments::{LayerReport, StackSettings, stack};
+use serde_json::json;
+use toile_character::{Pose, SkinWeights};
+use toile_garments::{LayerReport, PosedReport, StackSettings, Worn, carry_weights, posed_report, stack};
 use toile_geometry::{Mesh, ply};
 
 use crate::{
     StudioError,
-    pipeline::{Run, skin_attributes::take_weights},
+    pipeline::{
+        Run,
+        body_file::Body,
+        motion,
+        skin_attributes::{take_weights, with_weights},
+    },
     stage::{Product, Record, Stage, plain},
 };
 
 /// Raised whenever the same inputs and settings give other garments.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Expected seconds for each garment.
 pub const COST: f64 = 1.5;
+/// Poses of the shipped walk in which crossings are counted.
+const POSES: usize = 4;
 
 /// Stacks all garments, unless they are up to date.
 ///
 /// # Errors
 /// [`StudioError`] where a mesh is broken, or files cannot be read or written.
-pub fn run(run: &Run) -> Result<Record, StudioError> {
+pub fn run(run: &Run, body: &Body) -> Result<Record, StudioError> {
     let folders = &run.folders;
     let garments: Vec<&str> = run.garments().collect();
     let settings = StackSettings::default();
-    let inputs = std::iter::once(folders.body_mesh()).chain(garments.iter().map(|l| folders.unstacked(l))).collect();
+    let of_body = [folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
+    let inputs = of_body.into_iter().chain(garments.iter().map(|l| folders.unstacked(l))).collect();
     let stage = Stage {
         name: "stack",
         version: VERSION,
@@ -37,23 +48,49 @@ pub fn run(run: &Run) -> Result<Record, StudioError> {
         outputs_vary: false,
     };
     stage.run(&run.label("layers", "stack"), run.progress, |progress| {
-        let body = run.read_mesh(&folders.body_mesh())?;
-        let mut layers: Vec<Mesh> = garments.iter().map(|l| garment(run, l)).collect::<Result<_, _>>()?;
-        let report =
-            stack(&body, &mut layers, &settings, progress).map_err(|e| StudioError::stage(&folders.root, e))?;
-        let files = garments.iter().zip(&layers).map(|(l, mesh)| (folders.garment(l), ply::encode(mesh))).collect();
+        let body_mesh = run.read_mesh(&folders.body_mesh())?;
+        let (mut layers, mut weights): (Vec<Mesh>, Vec<SkinWeights>) =
+            garments.iter().map(|l| garment(run, l)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+        let wrong = |e| StudioError::stage(&folders.root, e);
+        let report = stack(&body_mesh, &mut layers, &settings, progress).map_err(wrong)?;
+        carry_weights(&layers, &mut weights).map_err(wrong)?;
+        let walking = walking(body, &body_mesh, &layers, &weights)?;
+        let encoded = layers.iter().zip(&weights).map(|(mesh, w)| ply::encode(&with_weights(mesh, w)));
+        let files = garments.iter().map(|l| folders.garment(l)).zip(encoded).collect();
         let warnings = garments.iter().zip(&report.layers).filter_map(|(l, r)| warning(l, r)).collect();
-        Ok(Product { files, result: plain(&report)?, warnings, ..Product::default() })
+        let result = json!({ "layers": plain(&report.layers)?, "walking": plain(&walking)? });
+        Ok(Product { files, result, warnings, ..Product::default() })
     })
 }
 
-fn garment(run: &Run, layer: &str) -> Result<Mesh, StudioError> {
-    let mut mesh = run.read_mesh(&run.folders.unstacked(layer))?;
-    take_weights(&mut mesh);
-    Ok(mesh)
+fn garment(run: &Run, layer: &str) -> Result<(Mesh, SkinWeights), StudioError> {
+    let path = run.folders.unstacked(layer);
+    let mut mesh = run.read_mesh(&path)?;
+    let weights =
+        take_weights(&mut mesh).ok_or_else(|| StudioError::format(&path, "has no skin weights; delete it"))?;
+    Ok((mesh, weights))
+}
+
+/// What the layers do in the shipped walk by their weights alone.
+fn walking(
+    body: &Body,
+    body_mesh: &Mesh,
+    layers: &[Mesh],
+    weights: &[SkinWeights],
+) -> Result<Vec<PosedReport>, StudioError> {
+    let skeleton = &body.skinned.skeleton;
+    let walk = motion::load(None, skeleton)?.motion.poses;
+    let poses: Vec<Pose> = (0..POSES.min(walk.len())).map(|k| walk[k * walk.len() / POSES].clone()).collect();
+    let mut worn = vec![Worn { mesh: body_mesh, weights: &body.skinned.weights }];
+    worn.extend(layers.iter().zip(weights).map(|(mesh, weights)| Worn { mesh, weights }));
+    Ok(posed_report(&worn, skeleton, &body.pose0, &poses).split_off(1))
 }
 
 fn warning(layer: &str, report: &LayerReport) -> Option<String> {
-    let pairs = report.crossing_pairs;
-    (pairs > 0).then(|| format!("{layer}: {pairs} pairs of triangles still cut through a layer below"))
+    let (pairs, cut) = (report.crossing_pairs, report.cut_triangles);
+    match () {
+        () if pairs > 0 => Some(format!("{layer}: {pairs} pairs of triangles still cut through a layer below")),
+        () if cut > 0 => Some(format!("{layer}: {cut} triangles were cut out because they crossed a layer below")),
+        () => None,
+    }
 }

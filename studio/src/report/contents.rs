@@ -42,6 +42,8 @@ pub struct Contents {
     pub garments: Vec<(String, Mesh)>,
     /// Of each garment, the share of its vertices by their gap to the layers below (bins as in stacking's report).
     pub gaps: Vec<(String, Vec<f64>)>,
+    /// Cells of the table [`STACKED`], by garment.
+    pub stacked: Vec<Vec<String>>,
     /// All layers at some times of the motion, with a caption each.
     pub motion: Vec<(String, Vec<Mesh>)>,
     /// Seconds by stage name.
@@ -88,6 +90,7 @@ pub fn write(contents: &Contents, at: &Path, progress: &(dyn Fn(f32) + Sync)) ->
     page.section("Garments", "Each as it was cut out, alone and on the body; how sure its border is; what was filled.");
     page.pictures(&drawn(pictures::exploded(&layers))?)?;
     gaps_table(&mut page, &contents.gaps);
+    page.table(&STACKED, &contents.stacked);
     for (layer, garment) in &contents.garments {
         page.subsection(layer);
         page.pictures(&drawn(pictures::garment(garment, &contents.body))?)?;
@@ -109,6 +112,17 @@ fn worries(page: &mut Page, contents: &Contents) {
         page.notes("good", &["Nothing: every take is whole, every stage trusts its result.".into()]);
     }
 }
+
+/// What is told of stacking; "seen" is where the scan saw the garment.
+const STACKED: [&str; 7] = [
+    "stacking",
+    "moved where seen, mean mm",
+    "p95 mm",
+    "least gap, mm",
+    "crossing pairs",
+    "crossing pairs in the walk",
+    "largest stretch in the walk",
+];
 
 /// Per cent of each garment's vertices by their gap to what is below.
 fn gaps_table(page: &mut Page, gaps: &[(String, Vec<f64>)]) {

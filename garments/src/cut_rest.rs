@@ -1,0 +1,60 @@
+//! The last resort of stacking: the few triangles that still cross are cut out of the upper layer. Vertices stay, so
+//! that what goes with them (weights, attributes) stays valid.
+
+use std::collections::BTreeSet;
+
+use toile_geometry::intersection::{crossings, self_crossings};
+
+use crate::worn_surface::WornSurface;
+
+/// More than this share of a layer's triangles is not cut: such a layer cannot be parted.
+const MOST: f32 = 0.005;
+
+/// Cuts the triangles of surface `upper` that cross a surface below, and of each pair that crosses within the layer but
+/// is not among `own_before` one. Returns how many triangles were cut.
+pub fn cut_rest(surfaces: &mut [WornSurface], upper: usize, own_before: &[[u32; 2]]) -> usize {
+    let mesh = &surfaces[upper].mesh;
+    let mut cut: BTreeSet<u32> =
+        surfaces[..upper].iter().flat_map(|l| crossings(mesh, &l.mesh, &l.bvh)).map(|pair| pair[0]).collect();
+    for pair in self_crossings(mesh, &surfaces[upper].bvh) {
+        if own_before.binary_search(&pair).is_err() && !cut.contains(&pair[0]) {
+            cut.insert(pair[1]);
+        }
+    }
+    if cut.is_empty() || cut.len() as f32 > MOST * mesh.triangles.len() as f32 {
+        return 0;
+    }
+    let mut rest = mesh.clone();
+    let kept = (0u32..).zip(&mesh.triangles).filter(|(t, _)| !cut.contains(t));
+    rest.triangles = kept.map(|(_, &corners)| corners).collect();
+    surfaces[upper] = WornSurface::new(&rest);
+    cut.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+    use toile_geometry::Mesh;
+
+    use super::*;
+
+    #[test]
+    fn a_spike_through_a_sheet_is_cut_and_a_sheet_through_a_sheet_is_not() {
+        let n = 31u32;
+        let sheet = |height: &dyn Fn(u32, u32) -> f32| {
+            let at = |i: u32| Point3::new((i % n) as f32 * 0.01, (i / n) as f32 * 0.01, height(i % n, i / n));
+            let triangles = (0..n - 1)
+                .flat_map(|j| (0..n - 1).map(move |i| j * n + i))
+                .flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]])
+                .collect();
+            WornSurface::new(&Mesh::new((0..n * n).map(at).collect(), triangles))
+        };
+        let spike = |i: u32, j: u32| if (i, j) == (15, 15) { -0.005 } else { 0.003 };
+        let mut surfaces = [sheet(&|_, _| 0.0), sheet(&spike)];
+        assert_eq!(cut_rest(&mut surfaces, 1, &[]), 6);
+        assert_eq!(surfaces[1].mesh.positions.len() as u32, n * n);
+        assert_eq!(cut_rest(&mut surfaces, 1, &[]), 0);
+        let mut through = [sheet(&|_, _| 0.0), sheet(&|i, _| i as f32 * 0.001 - 0.0152)];
+        assert_eq!(cut_rest(&mut through, 1, &[]), 0);
+    }
+}
