@@ -5,12 +5,15 @@ use rayon::prelude::*;
 use toile_character::{SkinWeights, joint::JOINT_COUNT, skinning};
 use toile_geometry::{Mesh, bvh::Bvh};
 
-use crate::{ExtractSettings, Take, surface_solve::SurfaceSystem};
+use crate::{ExtractSettings, Take, hanging::FREE_PART, surface_solve::SurfaceSystem};
 
 /// Weights are smoothed over at least this length, metres: the body's own triangles are no finer.
 const LEAST_SMOOTHING: f32 = 0.01;
 /// Cloth at distance d from the body shares its weights with what lies within this many times d.
 const SMOOTHING_PER_DISTANCE: f32 = 1.5;
+
+/// Least smoothing of weights where a garment hangs free ([`FREE_PART`]), metres: both legs carry a skirt.
+const FREE_SMOOTHING: f32 = 0.08;
 
 /// Skin weights of a garment in a take: those of the closest body triangle that faces the same way (seed §5.2), then
 /// spread over the garment the further the looser it hangs, so that a skirt does not tear between the legs.
@@ -19,10 +22,10 @@ pub fn weights(take: &Take, garment: &Mesh, settings: &ExtractSettings) -> SkinW
         return SkinWeights::default();
     }
     let (mut closest, distances) = closest_weights(take, garment);
-    let lengths: Vec<f32> = distances
-        .iter()
-        .map(|&d| LEAST_SMOOTHING.max(SMOOTHING_PER_DISTANCE * d * (d / settings.loose_distance.max(1e-4)).min(1.0)))
-        .collect();
+    let free = garment.attributes.get(FREE_PART);
+    let least = |v: usize| if free.is_some_and(|f| f[v] > 0.5) { FREE_SMOOTHING } else { LEAST_SMOOTHING };
+    let loose = |d: f32| SMOOTHING_PER_DISTANCE * d * (d / settings.loose_distance.max(1e-4)).min(1.0);
+    let lengths: Vec<f32> = distances.iter().enumerate().map(|(v, &d)| least(v).max(loose(d))).collect();
     let system = SurfaceSystem::new(garment);
     let anchors: Vec<f32> = lengths.iter().map(|l| 1.0 / (l * l)).collect();
     let used: Vec<usize> = (0..JOINT_COUNT).filter(|&j| closest.iter().any(|row| row[j] > 0.0)).collect();

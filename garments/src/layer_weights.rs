@@ -5,17 +5,17 @@ use rayon::prelude::*;
 use toile_character::{SkinWeights, joint::JOINT_COUNT};
 use toile_geometry::{Mesh, bvh::Bvh};
 
-use crate::{GarmentError, surface_solve::SurfaceSystem};
+use crate::{GarmentError, hanging::FREE_PART, surface_solve::SurfaceSystem};
 
 /// Nearer than the first a vertex has the weights of the layer below; further than the second its own; metres.
-const NEAR: [f32; 2] = [0.02, 0.05];
+const NEAR: [f32; 2] = [0.015, 0.03];
 /// The mixture is smoothed over this length, metres.
 const SMOOTHING: f32 = 0.008;
 /// Surfaces face alike up to this angle (cosine).
 const FACING: f32 = 0.3;
 
 /// Gives each of the `layers` (inside to outside, stacked, with their `weights`) the weights of the nearest layer below
-/// where that is close. Layers over bare body keep their own weights.
+/// where that is close. Layers over bare body keep their own weights, and so does what hangs free ([`FREE_PART`]).
 ///
 /// # Errors
 /// [`GarmentError::Mismatch`] where a layer has not as many weights as vertices.
@@ -48,8 +48,10 @@ impl<'a> Lower<'a> {
 
 fn carried(upper: &Mesh, own: &SkinWeights, lowers: &[Lower]) -> SkinWeights {
     let normals = upper.vertex_normals();
-    let rows: Vec<Option<[f32; JOINT_COUNT]>> =
-        (0..own.len()).into_par_iter().map(|v| mixed(upper, &normals, own, lowers, v)).collect();
+    let free = upper.attributes.get(FREE_PART);
+    let close = |v: usize| free.is_none_or(|f| f[v] < 0.5);
+    let mix = |v: usize| close(v).then(|| mixed(upper, &normals, own, lowers, v)).flatten();
+    let rows: Vec<Option<[f32; JOINT_COUNT]>> = (0..own.len()).into_par_iter().map(mix).collect();
     if rows.iter().all(Option::is_none) {
         return own.clone();
     }

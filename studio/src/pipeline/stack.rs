@@ -80,7 +80,9 @@ fn walking(
 ) -> Result<Vec<PosedReport>, StudioError> {
     let skeleton = &body.skinned.skeleton;
     let walk = motion::load(None, skeleton)?.motion.poses;
-    let poses: Vec<Pose> = (0..POSES.min(walk.len())).map(|k| walk[k * walk.len() / POSES].clone()).collect();
+    // A little more than a quarter each, so that a walk that repeats is not looked at in one phase alone.
+    let at = |k: usize| k * 5 * walk.len() / (4 * POSES) % walk.len();
+    let poses: Vec<Pose> = (0..POSES.min(walk.len())).map(|k| walk[at(k)].clone()).collect();
     let mut worn = vec![Worn { mesh: body_mesh, weights: &body.skinned.weights }];
     worn.extend(layers.iter().zip(weights).map(|(mesh, weights)| Worn { mesh, weights }));
     Ok(posed_report(&worn, skeleton, &body.pose0, &poses).split_off(1))
