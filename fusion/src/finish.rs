@@ -13,7 +13,7 @@ use crate::{
     integrate::integrate,
     motion::{Axis, find_axis, total_turn},
     report::{FusionReport, VolumeReport},
-    surface::extract_surface,
+    surface::{crossings, tidy},
     track::{DEGENERATE, register, samples},
     tsdf::Tsdf,
     view::{View, decode_color},
@@ -60,12 +60,16 @@ impl Fuser {
         }
         let field = self.final_field()?;
         progress(0.7);
-        let raw = self.clock.time("extract", || extract_surface(&field, LEAST_WEIGHT));
+        let size = FieldSize { blocks: field.block_count(), bytes: field.bytes(), truncation: field.truncation() };
+        let raw = self.clock.time("extract", || {
+            let crossings = crossings(&field, LEAST_WEIGHT);
+            drop(field);
+            tidy(&crossings)
+        });
         report.triangles_raw = raw.triangles.len();
         let placed = self.place(&raw, &mut report);
         let mesh = raw.transformed(&placed);
-        let size = FieldSize { blocks: field.block_count(), bytes: field.bytes(), truncation: field.truncation() };
-        drop((field, raw));
+        drop(raw);
         let (settings, on_floor) = (&self.settings, self.volume.as_ref().is_some_and(|v| v.floor.is_some()));
         let (mesh, cleaned) = self.clock.time("clean up", || clean_up(mesh, settings, on_floor));
         report.triangles = mesh.triangles.len();

@@ -27,6 +27,11 @@ struct Piece {
 /// The zero surface where every corner of a cell has at least `min_weight`. Counter-clockwise from outside, vertices
 /// shared, with normals, colours (where the field has them) and the attribute [`WEIGHT`].
 pub fn extract_surface(tsdf: &Tsdf, min_weight: u16) -> Mesh {
+    tidy(&crossings(tsdf, min_weight))
+}
+
+/// The first half of [`extract_surface`]; the field may go before the second, [`tidy`].
+pub(crate) fn crossings(tsdf: &Tsdf, min_weight: u16) -> Mesh {
     let pieces: Vec<Piece> =
         (0..tsdf.block_count()).into_par_iter().map(|slot| piece(tsdf, slot, min_weight)).collect();
     let mut starts = Vec::with_capacity(pieces.len());
@@ -37,6 +42,7 @@ pub fn extract_surface(tsdf: &Tsdf, min_weight: u16) -> Mesh {
     }
     let mut mesh = Mesh::default();
     let mut weights = Vec::with_capacity(total);
+    mesh.positions.reserve_exact(total);
     for piece in &pieces {
         for (_, p, color, weight) in &piece.owned {
             mesh.positions.push(*p);
@@ -63,11 +69,11 @@ pub fn extract_surface(tsdf: &Tsdf, min_weight: u16) -> Mesh {
         .flatten_iter()
         .collect();
     mesh.attributes.insert(WEIGHT.into(), weights);
-    drop_unused(mesh)
+    mesh
 }
 
-/// Vertices on edges without any complete cell have no triangle: drop them and set normals.
-fn drop_unused(mesh: Mesh) -> Mesh {
+/// Vertices on edges without any complete cell have no triangle: drops them and sets normals.
+pub(crate) fn tidy(mesh: &Mesh) -> Mesh {
     let (mut mesh, _) = mesh.filter_triangles(|_| true);
     mesh.recompute_normals();
     mesh
