@@ -97,7 +97,7 @@ pub fn fit_body(
     let conformed = conform(model, &fine.state, &scan, &trust, settings, &landmarks)?;
     progress(0.95);
     let context = Context { prepared, mend, coarse_iterations, landmarks, dressed: settings.dressed };
-    let fit = assemble(model, &scan, &trust, fine, conformed, context);
+    let fit = assemble(model, &scan, fine, conformed, context);
     progress(1.0);
     Ok(fit)
 }
@@ -263,14 +263,7 @@ struct Context {
     dressed: bool,
 }
 
-fn assemble(
-    model: &BodyModel,
-    scan: &Mesh,
-    trust: &[f32],
-    fine: LevelResult,
-    conformed: Conformed,
-    context: Context,
-) -> BodyFit {
+fn assemble(model: &BodyModel, scan: &Mesh, fine: LevelResult, conformed: Conformed, context: Context) -> BodyFit {
     let State { pose, beta } = fine.state.clone();
     let skeleton = model.skeleton_at(&beta);
     let transforms = pose.skinning_transforms(&skeleton);
@@ -285,7 +278,7 @@ fn assemble(
     if context.mend.rotation.angle() > 1e-9 {
         notices.push("the scan does not stand on +Y; turned upright".into());
     }
-    let mut report = judge(model, scan, trust, &fine, &conformed.points, &measurements, notices, context.dressed);
+    let mut report = judge(model, scan, &fine, &conformed.points, &measurements, notices, context.dressed);
     report.iterations += context.coarse_iterations;
     let (mend, landmarks) = (context.mend, context.landmarks);
     BodyFit { beta, pose, skeleton, body, model_mesh, mend, landmarks, measurements, report }

@@ -9,6 +9,7 @@ use toile_character::{BodyModel, Region};
 use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals};
 
 use crate::{
+    body_fit::trust_of,
     cloud::{Cloud, Samples, vertex_areas},
     level::LevelResult,
     measure::Measurements,
@@ -81,13 +82,13 @@ const COVERED_DRESSED: f32 = 0.10;
 pub(crate) fn judge(
     model: &BodyModel,
     scan: &Mesh,
-    trust: &[f32],
     fine: &LevelResult,
     body: &[Point3<f32>],
     measurements: &Measurements,
     notices: Vec<String>,
     dressed: bool,
 ) -> FitReport {
+    let trust = &trust_of(scan);
     let samples = Samples::of_mesh(scan, &scan.normals, trust, 0.012);
     let posed = model.posed(&fine.state.beta, &fine.state.pose);
     let to_model = distances(&samples, &posed, model);

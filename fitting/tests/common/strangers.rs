@@ -9,7 +9,7 @@ use super::Numbers;
 
 /// The bodies of a `strangers` file, in the A-pose. The layout is in `toile_body/strangers.py`.
 pub fn read(model: &BodyModel, bytes: &[u8]) -> Vec<SkinnedMesh> {
-    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+    let word = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|k| bytes[at + k]));
     let real = |at: usize| f64::from(f32::from_bits(word(at)));
     assert_eq!(&bytes[..8], b"TOILESTR");
     let [people, vertices, components, joints] = [8, 12, 16, 20].map(|at| word(at) as usize);
@@ -97,7 +97,7 @@ pub fn one_view(body: &Mesh, heading: f64, numbers: &mut Numbers) -> Mesh {
     let eye = Point3::new(middle.x, low + 0.52 * (high - low), middle.z) + turn * Vector3::z() * 2.4;
     let mut mesh = Mesh::default();
     let mut at = vec![None; SIZE.0 * SIZE.1];
-    for i in 0..at.len() {
+    for (i, at) in at.iter_mut().enumerate() {
         let (u, v) = ((i % SIZE.0) as f64 - 255.5, (i / SIZE.0) as f64 - 211.5);
         let ray = turn * Vector3::new(u / FOCAL, -v / FOCAL, -1.0).cast::<f32>();
         let Some(hit) = bvh.ray(&eye, &ray, 4.0) else { continue };
@@ -110,7 +110,7 @@ pub fn one_view(body: &Mesh, heading: f64, numbers: &mut Numbers) -> Mesh {
         let z = f64::from(hit.t);
         let slope = ((1.0 - cosine * cosine) / (cosine * cosine)).min(16.0);
         let spread = 0.0015 * (0.6 + 0.1 * z * z) * (1.0 + 0.08 * slope);
-        at[i] = Some((mesh.positions.len() as u32, z));
+        *at = Some((mesh.positions.len() as u32, z));
         mesh.positions.push(eye + ray * (z + spread * numbers.normal()) as f32);
     }
     for i in 0..at.len() - SIZE.0 - 1 {
