@@ -89,7 +89,13 @@ impl Material {
             let rectifier = Rectifier::new(&figure.rig().sensors[0], 6.0);
             let depth = rectifier.rectify(frame.depth.as_ref().unwrap());
             let mut view = CutDepth::new(&rectifier.camera, &drop_edges(&rectifier.camera, &depth, 8.3), 0.001).view(2);
-            view.colors = view.elements.iter().map(|[_, n @ ..]| n.map(|c| (128.0 + 100.0 * c) as u8)).collect();
+            let shade = |n: f32| (128.0 + 100.0 * n) as u8;
+            view.colors = view
+                .elements
+                .iter()
+                .map(|e| e.parts())
+                .map(|[_, f, x, y]| [shade(f), shade(x), shade(y), 255])
+                .collect();
             view
         };
         Self {
@@ -128,7 +134,8 @@ fn steps_of_a_frame(c: &mut Criterion<CpuTime>, m: &Material) {
     let camera = m.scene.camera;
     let rectifier = Rectifier::new(&m.scene.rig().sensors[0], 6.0);
     let raw: Vec<Vec<f32>> = m.frames.iter().map(|f| rectifier.rectify(f.depth.as_ref().unwrap())).collect();
-    let cut: Vec<Vec<f32>> = m.views.iter().map(|v| v.elements.iter().map(|e| e[0]).collect()).collect();
+    let cut: Vec<Vec<f32>> =
+        m.views.iter().map(|v| v.elements[..v.pixels()].iter().map(|e| e.depth()).collect()).collect();
     group.bench_function(format!("filter/{}", m.size), |b| {
         each(b, |i| drop_edges(&camera, &raw[i], settings.jump_slope));
     });

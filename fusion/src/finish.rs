@@ -219,7 +219,7 @@ impl Fuser {
         let mut timings = self.clock.timings();
         timings.blocks = field.blocks;
         timings.voxels = field.blocks * crate::tsdf::VOXELS;
-        timings.voxels_touched_per_frame = self.touched * crate::tsdf::VOXELS / self.kept.len().max(1);
+        timings.voxels_touched_per_frame = self.touched / self.kept.len().max(1);
         timings.voxels_updated_per_frame = self.updated / self.kept.len().max(1);
         timings.simd = crate::lanes::instruction_set().into();
         timings.field_bytes = field.bytes;

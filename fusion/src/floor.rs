@@ -3,10 +3,7 @@
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 use toile_geometry::camera::PinholeCamera;
 
-use crate::{
-    normals::{normal_of, surface_elements},
-    view::unproject,
-};
+use crate::{normals::surface_elements, view::unproject};
 
 /// Largest angle between the floor's normal and the image's upward direction, as a cosine (40°).
 const UPWARD: f32 = 0.77;
@@ -66,11 +63,11 @@ fn upward_pixels(camera: &PinholeCamera, background: &[f32]) -> Vec<Upward> {
     let mut pixels = Vec::new();
     for y in (0..h).step_by(2) {
         for x in (0..w).step_by(2) {
-            let element = &elements[y * w + x];
+            let element = elements[y * w + x];
             let [rx, ry, _] = unproject(camera, x as f32, y as f32, 1.0);
-            let normal = normal_of(element, rx, ry);
-            if element[0] > 0.0 && -normal[1] > UPWARD {
-                let point = Point3::new(rx, ry, 1.0) * element[0];
+            let normal = element.normal(rx, ry);
+            if element.is_some() && -normal[1] > UPWARD {
+                let point = Point3::new(rx, ry, 1.0) * element.depth();
                 pixels.push(Upward { point: point.cast(), normal: Vector3::from(normal).cast() });
             }
         }

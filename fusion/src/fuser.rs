@@ -155,7 +155,7 @@ impl Fuser {
         let (scan_from_camera, tracked) = found;
         let model = &mut self.model;
         let touched = self.clock.time("integrate", || integrate(model, &view, &scan_from_camera))?;
-        self.touched += touched.blocks;
+        self.touched += touched.voxels;
         self.updated += touched.updated;
         self.motion.push(frame.device_time_ns, scan_from_camera);
         self.kept.push(Kept {
@@ -327,7 +327,7 @@ impl Fuser {
         let (overlap, inliers, residual) = TRUST;
         let mut limit = residual * f64::from(self.model.truncation());
         if tracked.residual > limit {
-            let depth: Vec<f32> = view.elements.iter().map(|e| e[0]).collect();
+            let depth: Vec<f32> = view.elements[..view.pixels()].iter().map(|e| e.depth()).collect();
             limit = limit.max(NOISE_RESIDUAL * depth_noise(&view.camera, &depth).unwrap_or(0.0));
         }
         if tracked.overlap < overlap {

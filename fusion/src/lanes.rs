@@ -13,6 +13,8 @@ mod tests;
 
 pub(crate) use scalar::Scalar;
 
+use crate::element::Element;
+
 /// Number of lanes.
 pub(crate) const LANES: usize = 16;
 
@@ -45,13 +47,19 @@ pub(crate) trait Lanes: Copy + Send + Sync {
     fn gt(self, a: Self::F, b: Self::F) -> Self::M;
     fn and(self, a: Self::M, b: Self::M) -> Self::M;
     fn or(self, a: Self::M, b: Self::M) -> Self::M;
+    /// Lane k as bit k.
+    fn bits(self, a: Self::M) -> u32;
     fn any(self, a: Self::M) -> bool;
     /// `a` where the mask is set, else `b`.
     fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F;
     /// The integers that whole floats from 0 to 2²⁴ stand for.
     fn indices(self, a: Self::F) -> [u32; LANES];
-    /// Component k of all records as the k-th result.
-    fn transpose(self, records: [&[f32; 4]; LANES]) -> [Self::F; 4];
+    /// Surface elements from depth, facing, and the normal's x and y.
+    fn pack(self, parts: [Self::F; 4]) -> [Element; LANES];
+    /// Depth, facing, and the normal's x and y of surface elements, in halves as they are gathered.
+    fn unpack(self, elements: [[Element; LANES / 2]; 2]) -> [Self::F; 4];
+    /// The four bytes of each value, in halves as they are gathered.
+    fn bytes(self, values: [[[u8; 4]; LANES / 2]; 2]) -> [Self::F; 4];
     fn from_i16(self, values: &[i16; LANES]) -> Self::F;
     fn from_u16(self, values: &[u16; LANES]) -> Self::F;
     /// Rounded to nearest even and saturated; the values must lie within ±2²².
@@ -91,7 +99,7 @@ pub(crate) trait Kernel {
 
 /// The values from `at` on, 0 beyond the end of the row.
 #[inline(always)]
-pub(crate) fn group<T: Copy + Default>(row: &[T], at: usize) -> [T; LANES] {
+pub(crate) fn group<T: Copy + Default, const N: usize>(row: &[T], at: usize) -> [T; N] {
     match row.get(at..).and_then(|r| r.first_chunk()) {
         Some(whole) => *whole,
         None => std::array::from_fn(|k| row.get(at + k).copied().unwrap_or_default()),

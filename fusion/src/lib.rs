@@ -12,20 +12,24 @@
 //!
 //! [`fuse`] runs all of it over a source; [`Fuser`] takes frames one by one.
 
+mod band;
 pub mod clean_up;
 pub mod closing;
 mod cube_table;
 pub mod depth_filter;
+pub mod element;
 pub mod error;
 mod finish;
 pub mod floor;
 pub mod fuser;
 pub mod integrate;
 mod lanes;
+mod layers;
 pub mod motion;
 pub mod noise;
 pub mod normals;
 mod photometric;
+mod projection;
 pub mod raycast;
 mod relocalise;
 pub mod report;

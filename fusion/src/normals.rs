@@ -2,12 +2,11 @@
 
 use toile_geometry::camera::PinholeCamera;
 
+use crate::element::Element;
 use crate::lanes::{Kernel, LANES, Lanes, dispatch, group, put_group};
 
-/// What one pixel says about its surface, laid out so that one load brings it all: depth (metres), unit normal · ray of
-/// unit depth (negative towards the camera), and the normal's x and y. All 0 where depth or normal is missing.
-pub type Element = [f32; 4];
-
+/// Elements that follow the image's, all empty: whoever looks up pixels can take a slice of this length anywhere.
+pub(crate) const PAGE: usize = 1 << 16;
 /// Neighbours farther than this many pixel widths in depth do not smooth each other.
 const SMOOTH_SLOPE: f32 = 4.0;
 /// A normal closer than this to the viewing ray's plane is not trusted (cosine).
@@ -19,16 +18,10 @@ const MAX_WINDOW: usize = 8;
 
 /// Elements with unit normals towards the camera from central (beside unmeasured pixels one-sided) differences of
 /// range-gated, averaged depth; empty where a direction has no neighbour or the surface is seen edge-on, and along the
-/// image's border. `window` is the averaging's half width, pixels. O(pixels · window).
+/// image's border. `window` is the averaging's half width, pixels. Row by row, then empty ones up to at least
+/// [`PAGE`]. O(pixels · window).
 pub fn surface_elements(camera: &PinholeCamera, depth: &[f32], window: usize) -> Vec<Element> {
     dispatch(SurfaceElements { camera, depth, window: window.min(MAX_WINDOW) })
-}
-
-/// The normal of an element whose pixel's ray of unit depth is (x, y, 1).
-#[inline]
-pub fn normal_of(element: &Element, x: f32, y: f32) -> [f32; 3] {
-    let [_, facing, nx, ny] = *element;
-    [nx, ny, facing - nx * x - ny * y]
 }
 
 struct SurfaceElements<'a> {
@@ -49,23 +42,20 @@ impl Kernel for SurfaceElements<'_> {
         let stride = along.stride;
         let smooth = gated_mean(l, &along, self.window, stride, slope);
         let rays = Rays::new(self.camera);
-        let mut elements = vec![[0.0; 4]; width * height];
+        let mut elements = vec![Element::EMPTY; (width * height).max(PAGE)];
         for y in 1..height.saturating_sub(1) {
             let row = &mut elements[y * width..(y + 1) * width];
             for x in (0..width).step_by(LANES) {
                 let at = smooth.at(x, y);
                 if l.any(l.gt(l.load(&group(&smooth.values, at)), l.splat(0.0))) {
                     let [facing, nx, ny] = normals(l, &smooth, at, &rays, x, y);
-                    let (facing, nx, ny) = (l.store(facing), l.store(nx), l.store(ny));
-                    let measured = group(&depth.values, at);
-                    for (k, element) in row[x..].iter_mut().take(LANES).enumerate() {
-                        let depth = if facing[k] < 0.0 { measured[k] } else { 0.0 };
-                        *element = [depth, facing[k], nx[k], ny[k]];
-                    }
+                    let measured = l.load(&group(&depth.values, at));
+                    let depth = l.keep(l.gt(l.splat(0.0), facing), measured);
+                    put_group(row, x, l.pack([depth, facing, nx, ny]));
                 }
             }
             if let [first, .., last] = row {
-                (*first, *last) = ([0.0; 4], [0.0; 4]);
+                (*first, *last) = (Element::EMPTY, Element::EMPTY);
             }
         }
         elements
@@ -243,15 +233,15 @@ mod tests {
             })
             .collect();
         let elements = surface_elements(&camera, &depth, 2);
-        for (i, element) in elements.iter().enumerate() {
+        for (i, element) in elements[..1200].iter().enumerate() {
             let (x, y) = (i % 40, i / 40);
             if [0, 39].contains(&x) || [0, 29].contains(&y) {
-                assert_eq!(*element, [0.0; 4], "the border at {x} {y}");
+                assert_eq!(*element, Element::EMPTY, "the border at {x} {y}");
             } else if x > 2 && x < 37 && y > 2 && y < 27 {
                 let r = unproject(&camera, x as f32, y as f32, 1.0);
-                let m = normal_of(element, r[0], r[1]);
+                let m = element.normal(r[0], r[1]);
                 assert!(dot(m, [n.x, n.y, n.z]) > 0.9999, "at {x} {y}: {m:?}");
-                assert_eq!(element[0], depth[i]);
+                assert_eq!(element.depth(), depth[i]);
             }
         }
     }
@@ -269,6 +259,6 @@ mod tests {
             .collect();
         let plain = SurfaceElements { camera: &camera, depth: &depth, window: 3 }.run(crate::lanes::Scalar);
         assert_eq!(surface_elements(&camera, &depth, 3), plain);
-        assert!(plain.iter().filter(|e| e[0] > 0.0).count() > 500);
+        assert!(plain.iter().filter(|e| e.is_some()).count() > 500);
     }
 }

@@ -149,7 +149,7 @@ fn vertex(tsdf: &Tsdf, slot: usize, v: [usize; 3], axis: usize, t: f32) -> (u16,
 
 fn color_between(tsdf: &Tsdf, a: [i32; 3], b: [i32; 3], t: f32) -> [u8; 3] {
     let at = |v: [i32; 3]| match tsdf.slot(v.map(|c| c >> 3)) {
-        slot if slot != NONE && tsdf.has_color() => tsdf.colors[slot as usize][local_index(v)],
+        slot if slot != NONE && tsdf.has_color() => tsdf.colors[slot as usize].voxel(local_index(v)),
         _ => [0; 4],
     };
     let (a, b) = (at(a), at(b));

@@ -72,7 +72,7 @@ fn the_ray_cast_lies_on_the_measured_surface() {
         .filter_map(|i| {
             let hit = seen.hits[i]?;
             let p = camera_from_figure * Point3::from(hit.point).cast::<f64>();
-            Some(p.z - f64::from(view.elements[i][0]))
+            Some(p.z - f64::from(view.elements[i].depth()))
         })
         .collect();
     let count = view.samples(1).count();

@@ -98,7 +98,7 @@ pub(crate) struct Normal {
 
 /// Samples of a view, thinned to about `count`.
 pub fn samples(view: &View, count: usize) -> Vec<Sample> {
-    let all = view.elements.iter().filter(|e| e[0] > 0.0).count();
+    let all = view.elements.iter().filter(|e| e.is_some()).count();
     let stride = ((all as f64 / count.max(1) as f64).sqrt().round() as usize).max(1);
     view.samples(stride)
         .filter_map(|i| {
@@ -118,7 +118,7 @@ pub fn track(tsdf: &Tsdf, view: &View, predicted: &Rigid) -> Tracked {
     if near.converged && near.overlap > NEAR.0 && near.inliers > NEAR.1 {
         return near;
     }
-    let stride = if view.elements.len() > 60_000 { 4 } else { 3 };
+    let stride = if view.pixels() > 60_000 { 4 } else { 3 };
     let model = ray_cast(tsdf, &view.camera, predicted, stride);
     let coarse = approach(&model, predicted, &points, predicted);
     register(tsdf, &points, &coarse)

@@ -6,6 +6,8 @@ use crate::FusionError;
 
 /// Voxels along a block's edge.
 pub const SIDE: usize = 8;
+/// Voxels along the edge of an octant: an eighth of a block, the least part that an integration looks at.
+pub(crate) const OCTANT: usize = SIDE / 2;
 /// Voxels in a block.
 pub const VOXELS: usize = SIDE * SIDE * SIDE;
 /// Marker of a block that does not exist.
@@ -27,7 +29,8 @@ pub struct Voxel {
 /// Mean colour of one voxel: 8.8 fixed point channels and the sum of weights.
 pub type ColorVoxel = [u16; 4];
 
-/// A block: 512 voxels, x fastest, distances and weights apart so that rows of eight are updated together.
+/// A block: 512 voxels in the order of [`local_index`], distances and weights apart, so that a layer of an octant is
+/// updated at once.
 #[derive(Debug, Clone)]
 pub(crate) struct Block {
     pub sdf: [i16; VOXELS],
@@ -35,7 +38,7 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    const EMPTY: Self = Self { sdf: [0; VOXELS], weight: [0; VOXELS] };
+    pub(crate) const EMPTY: Self = Self { sdf: [0; VOXELS], weight: [0; VOXELS] };
 
     /// One voxel.
     #[inline]
@@ -48,8 +51,23 @@ impl Block {
         self.sdf.iter().zip(&self.weight).any(|(s, w)| *w > 0 && *s <= 0)
     }
 }
-/// The colours of a block.
-pub(crate) type ColorBlock = [ColorVoxel; VOXELS];
+/// The colours of a block, channel by channel, and their weights.
+#[derive(Debug, Clone)]
+pub(crate) struct ColorBlock {
+    pub channels: [[u16; VOXELS]; 3],
+    pub weight: [u16; VOXELS],
+}
+
+impl ColorBlock {
+    const EMPTY: Self = Self { channels: [[0; VOXELS]; 3], weight: [0; VOXELS] };
+
+    /// One voxel's.
+    #[inline]
+    pub(crate) fn voxel(&self, k: usize) -> ColorVoxel {
+        let [r, g, b] = &self.channels;
+        [r[k], g[k], b[k], self.weight[k]]
+    }
+}
 
 /// A sparse truncated signed distance field. Voxel (i, j, k) is sampled at `voxel_size * (i, j, k)`, scan frame.
 #[derive(Debug, Clone)]
@@ -134,7 +152,7 @@ impl Tsdf {
             self.coords.push(b);
             self.blocks.push(Block::EMPTY);
             if self.with_color {
-                self.colors.push([[0; 4]; VOXELS]);
+                self.colors.push(ColorBlock::EMPTY);
             }
         }
         self.index.slots[cell]
@@ -204,9 +222,10 @@ impl Tsdf {
                 return None;
             }
             let block = &self.blocks[slot as usize];
-            let at = local_index(v);
+            let (x, y) = ([along_x(v[0]), along_x(v[0] + 1)], [along_y(v[1]), along_y(v[1] + 1)]);
+            let z = [along_z(v[2]), along_z(v[2] + 1)];
             for (k, c) in corners.iter_mut().enumerate() {
-                let j = at + (k & 1) + ((k >> 1) & 1) * 8 + (k >> 2) * 64;
+                let j = x[k & 1] + y[k >> 1 & 1] + z[k >> 2];
                 if block.weight[j] == 0 {
                     return None;
                 }
@@ -282,10 +301,25 @@ pub(crate) fn floor(x: f32) -> i32 {
     i - i32::from(x < i as f32)
 }
 
-/// Index of a voxel in its block.
+/// Index of a voxel in its block: octant by octant, within them layer by layer of z, x fastest.
 #[inline]
 pub(crate) fn local_index(v: [i32; 3]) -> usize {
-    ((v[2] & 7) * 64 + (v[1] & 7) * 8 + (v[0] & 7)) as usize
+    along_x(v[0]) + along_y(v[1]) + along_z(v[2])
+}
+
+#[inline]
+fn along_x(c: i32) -> usize {
+    ((c & 3) | (c & 4) << 4) as usize
+}
+
+#[inline]
+fn along_y(c: i32) -> usize {
+    ((c & 3) << 2 | (c & 4) << 5) as usize
+}
+
+#[inline]
+fn along_z(c: i32) -> usize {
+    ((c & 3) << 4 | (c & 4) << 6) as usize
 }
 
 #[inline]

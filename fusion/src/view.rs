@@ -5,7 +5,7 @@ use std::sync::Arc;
 use toile_capture::{ColorImage, DepthImage, RgbImage, Sensor};
 use toile_geometry::camera::PinholeCamera;
 
-use crate::normals::{Element, normal_of, surface_elements};
+use crate::{element::Element, normals::surface_elements};
 
 /// Filtered depth of the used part of an image, compact enough to keep a whole take.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,10 +23,10 @@ pub struct CutDepth {
 pub struct View {
     /// Ideal pinhole camera of the part.
     pub camera: PinholeCamera,
-    /// One element a pixel, row by row; those along the border are empty.
+    /// One element a pixel, row by row, as [`surface_elements`] gives them; those along the border are empty.
     pub elements: Vec<Element>,
-    /// sRGB of each pixel, or empty.
-    pub colors: Vec<[u8; 3]>,
+    /// sRGB of each element and 255, or 0 where the colour is not seen; or nothing at all.
+    pub colors: Vec<[u8; 4]>,
 }
 
 impl CutDepth {
@@ -82,11 +82,22 @@ impl View {
         Self { camera: *camera, elements: surface_elements(camera, depth, window), colors: Vec::new() }
     }
 
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.camera.width as usize * self.camera.height as usize
+    }
+
+    /// Mean depth of the elements, metres; 1 of none.
+    pub fn mean_depth(&self) -> f32 {
+        let (sum, count) = self.samples(5).fold((0.0, 0), |(s, n), i| (s + f64::from(self.elements[i].depth()), n + 1));
+        if count == 0 { 1.0 } else { (sum / f64::from(count)) as f32 }
+    }
+
     /// The point of pixel `i`, camera frame; meaningless where the element is empty.
     #[inline]
     pub fn point(&self, i: usize) -> [f32; 3] {
         let w = self.camera.width as usize;
-        unproject(&self.camera, (i % w) as f32, (i / w) as f32, self.elements[i][0])
+        unproject(&self.camera, (i % w) as f32, (i / w) as f32, self.elements[i].depth())
     }
 
     /// Point and unit normal (towards the camera) of pixel `i`, camera frame; `None` where its element is empty.
@@ -99,13 +110,13 @@ impl View {
     /// The same of the pixel at a column and a row of the image.
     #[inline]
     pub fn element_at(&self, u: usize, v: usize) -> Option<([f32; 3], [f32; 3])> {
-        let element = &self.elements[v * self.camera.width as usize + u];
-        let z = element[0];
-        if z <= 0.0 {
+        let element = self.elements[v * self.camera.width as usize + u];
+        if !element.is_some() {
             return None;
         }
+        let z = element.depth();
         let [x, y, _] = unproject(&self.camera, u as f32, v as f32, 1.0);
-        Some(([x * z, y * z, z], normal_of(element, x, y)))
+        Some(([x * z, y * z, z], element.normal(x, y)))
     }
 
     /// Pixels with an element whose column and row are multiples of `stride`.
@@ -114,7 +125,7 @@ impl View {
         (0..h)
             .step_by(stride)
             .flat_map(move |y| (0..w).step_by(stride).map(move |x| y * w + x))
-            .filter(|&i| self.elements[i][0] > 0.0)
+            .filter(|&i| self.elements[i].is_some())
     }
 
     /// Looks up the colour of each element in a colour image of the same sensor.
@@ -123,14 +134,14 @@ impl View {
         let color_from_depth = sensor.color_from_depth;
         let sx = f64::from(image.width) / f64::from(camera.width);
         let sy = f64::from(image.height) / f64::from(camera.height);
-        let color = |i: usize| {
-            if self.elements[i][0] <= 0.0 {
-                return [0; 3];
-            }
+        self.colors = vec![[0; 4]; self.elements.len()];
+        for i in (0..self.pixels()).filter(|i| self.elements[*i].is_some()) {
             let p = color_from_depth * nalgebra::Point3::from(self.point(i)).cast::<f64>();
-            camera.project(&p).map_or([0; 3], |q| bilinear(image, (q.x * sx) as f32, (q.y * sy) as f32))
-        };
-        self.colors = (0..self.elements.len()).map(color).collect();
+            if let Some(q) = camera.project(&p) {
+                let [r, g, b] = bilinear(image, (q.x * sx) as f32, (q.y * sy) as f32);
+                self.colors[i] = [r, g, b, 255];
+            }
+        }
     }
 }
 

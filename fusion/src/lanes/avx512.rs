@@ -1,10 +1,11 @@
 //! Lanes in one AVX-512 register.
 
-use std::arch::x86_64::{__m128, __m512, __mmask16};
+use std::arch::x86_64::{__m512, __m512i, __mmask16};
 
 use pulp::{cast, x86::V4};
 
 use super::{LANES, Lanes};
+use crate::element::{Element, FACING_MASK, FACING_SCALE, NORMAL_SCALE, X_SHIFT, Y_MASK, Y_SHIFT};
 
 /// Lanes in one AVX-512 register.
 #[derive(Debug, Clone, Copy)]
@@ -73,6 +74,10 @@ impl Lanes for Avx512 {
         a | b
     }
     #[inline(always)]
+    fn bits(self, a: Self::M) -> u32 {
+        u32::from(a)
+    }
+    #[inline(always)]
     fn any(self, a: Self::M) -> bool {
         a != 0
     }
@@ -85,17 +90,44 @@ impl Lanes for Avx512 {
         cast(self.0.avx512f._mm512_cvttps_epi32(a))
     }
     #[inline(always)]
-    fn transpose(self, records: [&[f32; 4]; LANES]) -> [Self::F; 4] {
+    fn pack(self, [depth, facing, nx, ny]: [Self::F; 4]) -> [Element; LANES] {
         let simd = self.0.avx512f;
-        let (a, b) = (four_records(self.0, &records, 0), four_records(self.0, &records, 1));
-        let (c, d) = (four_records(self.0, &records, 2), four_records(self.0, &records, 3));
-        let (ab, cd) = (simd._mm512_unpacklo_ps(a, b), simd._mm512_unpacklo_ps(c, d));
-        let (ef, gh) = (simd._mm512_unpackhi_ps(a, b), simd._mm512_unpackhi_ps(c, d));
+        let whole = |a: __m512, scale: f32| simd._mm512_cvtps_epi32(simd._mm512_mul_ps(a, simd._mm512_set1_ps(scale)));
+        let low_bits = |a: __m512i, bits: i32| simd._mm512_and_si512(a, simd._mm512_set1_epi32(bits));
+        let x = simd._mm512_slli_epi32::<X_SHIFT>(whole(nx, NORMAL_SCALE));
+        let y = simd._mm512_slli_epi32::<Y_SHIFT>(low_bits(whole(ny, NORMAL_SCALE), Y_MASK));
+        let slant = low_bits(whole(facing, -FACING_SCALE), FACING_MASK);
+        let normal = simd._mm512_or_si512(simd._mm512_or_si512(x, y), slant);
+        let depth = simd._mm512_castps_si512(depth);
+        let (a, b) = (simd._mm512_unpacklo_epi32(depth, normal), simd._mm512_unpackhi_epi32(depth, normal));
+        let first = simd._mm512_permutex2var_epi64(a, cast([0u64, 1, 8, 9, 2, 3, 10, 11]), b);
+        let last = simd._mm512_permutex2var_epi64(a, cast([4u64, 5, 12, 13, 6, 7, 14, 15]), b);
+        let packed: [u64; LANES] = cast([first, last]);
+        packed.map(Element)
+    }
+    #[inline(always)]
+    fn unpack(self, [a, b]: [[Element; LANES / 2]; 2]) -> [Self::F; 4] {
+        let simd = self.0.avx512f;
+        let (even, odd): ([u32; LANES], [u32; LANES]) = const { (every_other(0), every_other(1)) };
+        let (a, b): (__m512, __m512) = (cast(a.map(|e| e.0)), cast(b.map(|e| e.0)));
+        let depth = simd._mm512_permutex2var_ps(a, cast(even), b);
+        let normal = simd._mm512_permutex2var_ps(a, cast(odd), b);
+        let normal = simd._mm512_castps_si512(normal);
+        let x = simd._mm512_srai_epi32::<{ X_SHIFT }>(normal);
+        let y = simd._mm512_srai_epi32::<{ X_SHIFT }>(simd._mm512_slli_epi32::<{ X_SHIFT - Y_SHIFT }>(normal));
+        let slant = simd._mm512_and_si512(normal, simd._mm512_set1_epi32(FACING_MASK));
+        let scaled = |a: __m512i, unit: f32| simd._mm512_mul_ps(simd._mm512_cvtepi32_ps(a), simd._mm512_set1_ps(unit));
+        [depth, scaled(slant, -1.0 / FACING_SCALE), scaled(x, 1.0 / NORMAL_SCALE), scaled(y, 1.0 / NORMAL_SCALE)]
+    }
+    #[inline(always)]
+    fn bytes(self, values: [[[u8; 4]; LANES / 2]; 2]) -> [Self::F; 4] {
+        let simd = self.0.avx512f;
+        let (v, low): (__m512i, __m512i) = (cast(values), simd._mm512_set1_epi32(0xFF));
         [
-            simd._mm512_shuffle_ps::<0x44>(ab, cd),
-            simd._mm512_shuffle_ps::<0xEE>(ab, cd),
-            simd._mm512_shuffle_ps::<0x44>(ef, gh),
-            simd._mm512_shuffle_ps::<0xEE>(ef, gh),
+            simd._mm512_cvtepi32_ps(simd._mm512_and_si512(v, low)),
+            simd._mm512_cvtepi32_ps(simd._mm512_and_si512(simd._mm512_srli_epi32::<8>(v), low)),
+            simd._mm512_cvtepi32_ps(simd._mm512_and_si512(simd._mm512_srli_epi32::<16>(v), low)),
+            simd._mm512_cvtepi32_ps(simd._mm512_srli_epi32::<24>(v)),
         ]
     }
     #[inline(always)]
@@ -120,11 +152,13 @@ impl Lanes for Avx512 {
     }
 }
 
-/// Records k, k + 4, k + 8 and k + 12 side by side.
-#[inline(always)]
-fn four_records(simd: V4, records: &[&[f32; 4]; LANES], k: usize) -> __m512 {
-    let (a, b): (__m128, __m128) = (cast(*records[k]), cast(*records[k + 4]));
-    let (c, d): (__m128, __m128) = (cast(*records[k + 8]), cast(*records[k + 12]));
-    let ab = simd.avx512f._mm512_insertf32x4::<1>(simd.avx512f._mm512_castps128_ps512(a), b);
-    simd.avx512f._mm512_insertf32x4::<3>(simd.avx512f._mm512_insertf32x4::<2>(ab, c), d)
+/// first, first + 2, first + 4, ...
+const fn every_other(first: u32) -> [u32; LANES] {
+    let mut all = [0; LANES];
+    let mut k = 0;
+    while k < LANES {
+        all[k] = first + 2 * k as u32;
+        k += 1;
+    }
+    all
 }

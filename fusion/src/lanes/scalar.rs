@@ -1,6 +1,7 @@
 //! Lanes as plain arrays: what every other kind must equal.
 
 use super::{LANES, Lanes};
+use crate::element::Element;
 
 /// Lanes as plain arrays.
 #[derive(Debug, Clone, Copy)]
@@ -72,6 +73,10 @@ impl Lanes for Scalar {
         each(|k| a[k] | b[k])
     }
     #[inline(always)]
+    fn bits(self, a: Self::M) -> u32 {
+        (0..LANES).fold(0, |bits, k| bits | u32::from(a[k]) << k)
+    }
+    #[inline(always)]
     fn any(self, a: Self::M) -> bool {
         a.contains(&true)
     }
@@ -84,8 +89,17 @@ impl Lanes for Scalar {
         a.map(|x| x as u32)
     }
     #[inline(always)]
-    fn transpose(self, records: [&[f32; 4]; LANES]) -> [Self::F; 4] {
-        std::array::from_fn(|c| each(|k| records[k][c]))
+    fn pack(self, [depth, facing, nx, ny]: [Self::F; 4]) -> [Element; LANES] {
+        each(|k| Element::new(depth[k], facing[k], [nx[k], ny[k]]))
+    }
+    #[inline(always)]
+    fn unpack(self, elements: [[Element; LANES / 2]; 2]) -> [Self::F; 4] {
+        let parts = elements.map(|half| half.map(Element::parts));
+        std::array::from_fn(|c| each(|k| parts[k / (LANES / 2)][k % (LANES / 2)][c]))
+    }
+    #[inline(always)]
+    fn bytes(self, values: [[[u8; 4]; LANES / 2]; 2]) -> [Self::F; 4] {
+        std::array::from_fn(|c| each(|k| f32::from(values[k / (LANES / 2)][k % (LANES / 2)][c])))
     }
     #[inline(always)]
     fn from_i16(self, values: &[i16; LANES]) -> Self::F {

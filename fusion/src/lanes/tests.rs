@@ -6,7 +6,7 @@ use super::*;
 #[derive(Clone)]
 struct Everything([[f32; LANES]; 4]);
 
-type Results = (Vec<u32>, [i16; LANES], [u16; LANES], [u32; LANES], bool);
+type Results = (Vec<u32>, [i16; LANES], [u16; LANES], [u32; LANES], u32, bool);
 
 impl Kernel for Everything {
     type Output = Results;
@@ -17,15 +17,20 @@ impl Kernel for Everything {
         let mask = l.or(l.and(l.ge(a, b), l.ge(d, c)), l.gt(c, a));
         let sum = l.add(l.mul(a, b), l.div(c, l.sub(d, a)));
         let chosen = l.select(mask, l.min(sum, d), l.max(b, l.sqrt(l.abs(sum))));
-        let records: [[f32; 4]; LANES] = std::array::from_fn(|k| std::array::from_fn(|i| self.0[i][k]));
-        let turned = l.transpose(std::array::from_fn(|k| &records[k]));
         let bounded = l.max(l.min(a, l.splat(1e5)), l.splat(-1e5));
+        let unit = l.max(l.min(b, l.splat(1.0)), l.splat(-1.0));
+        let packed = l.pack([bounded, l.sub(l.abs(unit), l.splat(1.5)), unit, l.mul(unit, unit)]);
+        let halves = [*packed.first_chunk().unwrap(), *packed.last_chunk().unwrap()];
+        let parts = l.unpack(halves);
+        let bytes = l.bytes(halves.map(|half| half.map(|e| ((e.0 >> 32) as u32).to_le_bytes())));
         let (small, positive) = (l.to_i16(bounded), l.to_u16(bounded));
         let back = l.keep(mask, l.add(l.from_i16(&small), l.from_u16(&positive)));
         let index = l.indices(l.max(l.min(l.round(bounded), l.splat(9.0)), l.splat(0.0)));
-        let floats = [sum, chosen, back, turned[0], turned[1], turned[2], turned[3]];
+        let [p, q, r, s] = parts;
+        let [t, u, v, w] = bytes;
+        let floats = [sum, chosen, back, p, q, r, s, t, u, v, w];
         let bits = floats.iter().flat_map(|f| l.store(*f)).map(|x| if x.is_nan() { 1 } else { x.to_bits() });
-        (bits.collect(), small, positive, index, l.any(mask))
+        (bits.collect(), small, positive, index, l.bits(mask), l.any(mask))
     }
 }
 

@@ -1,0 +1,222 @@
+//! The blocks of a field that a view's truncation band meets.
+
+use toile_geometry::Rigid;
+
+use crate::{
+    FusionError,
+    element::Element,
+    lanes::{Kernel, LANES, Lanes, dispatch, group},
+    normals::dot,
+    projection::Projection,
+    tsdf::{SIDE, Tsdf, floor},
+    view::View,
+};
+
+/// Makes the blocks within the truncation band of the view's elements where they are missing, and tells of each block of
+/// the field whether it is one of them.
+///
+/// # Errors
+/// [`FusionError::TooLarge`] where the block index would not fit.
+pub(crate) fn touch(
+    tsdf: &mut Tsdf,
+    view: &View,
+    scan_from_camera: &Rigid,
+    projection: &Projection<'_>,
+) -> Result<Vec<bool>, FusionError> {
+    let rays = Rays::new(tsdf, view, scan_from_camera, projection);
+    let mut touched = vec![false; tsdf.block_count()];
+    let Some([low, high]) = dispatch(Bounds(&rays)) else { return Ok(touched) };
+    tsdf.cover(low, high)?;
+    let grid = Grid { low, dims: [0, 1, 2].map(|k| (high[k] - low[k] + 1) as usize) };
+    let cells = dispatch(Mark { rays: &rays, grid: &grid });
+    for (cell, _) in cells.into_iter().enumerate().filter(|(_, marked)| *marked) {
+        let slot = tsdf.slot_or_new(grid.block(cell)) as usize;
+        if slot >= touched.len() {
+            touched.resize(slot + 1, false);
+        }
+        touched[slot] = true;
+    }
+    Ok(touched)
+}
+
+/// The view's rays in blocks of the field: at depth z they pass `origin + z direction`.
+struct Rays<'a> {
+    elements: &'a [Element],
+    size: [usize; 2],
+    nearest: f32,
+    origin: [f32; 3],
+    rotation: [[f32; 3]; 3],
+    /// x of each column's and y of each row's ray of unit depth.
+    columns: Vec<f32>,
+    rows: Vec<f32>,
+    /// Half the band's width, metres.
+    band: f32,
+    /// Half a block, metres: samples lie no farther apart.
+    spacing: f32,
+    /// Every so many rows and columns of pixels are sampled.
+    stride: usize,
+}
+
+impl<'a> Rays<'a> {
+    fn new(tsdf: &Tsdf, view: &View, scan_from_camera: &Rigid, projection: &Projection<'a>) -> Self {
+        let block = tsdf.voxel_size() * SIDE as f32;
+        let turn = scan_from_camera.rotation.to_rotation_matrix();
+        let rotation = std::array::from_fn(|k| std::array::from_fn(|j| turn[(k, j)] as f32 / block));
+        // A voxel belongs to the block with everything that is nearer to it than to others.
+        let half_voxel = 0.5 / SIDE as f32;
+        let ray = |i: usize, k: usize| (i as f32 - projection.center[k]) * projection.pitch[k];
+        Self {
+            elements: projection.elements,
+            size: projection.size,
+            nearest: projection.nearest,
+            origin: std::array::from_fn(|k| scan_from_camera.translation.vector[k] as f32 / block + half_voxel),
+            rotation,
+            spacing: 0.5 * block,
+            columns: (0..projection.size[0]).map(|u| ray(u, 0)).collect(),
+            rows: (0..projection.size[1]).map(|v| ray(v, 1)).collect(),
+            band: tsdf.truncation() + tsdf.voxel_size(),
+            stride: ((0.5 * block / (projection.pitch[1] * view.mean_depth())) as usize).clamp(1, 4),
+        }
+    }
+
+    /// Depths of the pixels from a place in the image on, 0 where nothing is to be fused.
+    #[inline(always)]
+    fn depths<L: Lanes>(&self, l: L, x: usize, y: usize) -> L::F {
+        let row = &self.elements[y * self.size[0]..(y + 1) * self.size[0]];
+        let halves = [group(row, x), group(row, x + LANES / 2)];
+        let [depth, ..] = l.unpack(halves);
+        l.keep(l.ge(depth, l.splat(self.nearest)), depth)
+    }
+
+    /// Which pixels from a place in the image on are sampled: those on the rows and columns, and those beside something
+    /// that is not seen, so that rims do not depend on where rows and columns lie.
+    #[inline(always)]
+    fn sampled<L: Lanes>(&self, l: L, x: usize, y: usize) -> u32 {
+        if self.stride == 1 {
+            return u32::MAX;
+        }
+        let column = x.next_multiple_of(self.stride) - x;
+        let columns = (column..LANES).step_by(self.stride).fold(0, |bits, k| bits | 1 << k);
+        let grid = if y.is_multiple_of(self.stride) { columns } else { 0 };
+        let beside = self.seen(l, x.max(1) - 1, y) & self.seen(l, x + 1, y);
+        grid | !(beside & self.seen(l, x, y - 1) & self.seen(l, x, y + 1))
+    }
+
+    /// Which pixels from a place in the image on are to be fused.
+    #[inline(always)]
+    fn seen<L: Lanes>(&self, l: L, x: usize, y: usize) -> u32 {
+        l.bits(l.gt(self.depths(l, x, y), l.splat(0.0)))
+    }
+
+    /// Directions of the rays of the pixels from a place in the image on.
+    #[inline(always)]
+    fn directions<L: Lanes>(&self, l: L, x: usize, y: usize) -> [L::F; 3] {
+        let column = l.load(&group(&self.columns, x));
+        let [a, b, c] = self.rotation.map(|r| [r[0], dot(r, [0.0, self.rows[y], 1.0])]);
+        [
+            l.add(l.mul(column, l.splat(a[0])), l.splat(a[1])),
+            l.add(l.mul(column, l.splat(b[0])), l.splat(b[1])),
+            l.add(l.mul(column, l.splat(c[0])), l.splat(c[1])),
+        ]
+    }
+}
+
+/// Least and greatest block coordinates of the band; `None` where nothing is seen.
+struct Bounds<'a>(&'a Rays<'a>);
+
+impl Kernel for Bounds<'_> {
+    type Output = Option<[[i32; 3]; 2]>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> Self::Output {
+        let rays = self.0;
+        let (mut low, mut high) = ([l.splat(f32::INFINITY); 3], [l.splat(f32::NEG_INFINITY); 3]);
+        let mut any = false;
+        for y in 0..rays.size[1] {
+            for x in (0..rays.size[0]).step_by(LANES) {
+                let depth = rays.depths(l, x, y);
+                let seen = l.gt(depth, l.splat(0.0));
+                if !l.any(seen) {
+                    continue;
+                }
+                any = true;
+                let direction = rays.directions(l, x, y);
+                let (near, far) = (l.sub(depth, l.splat(rays.band)), l.add(depth, l.splat(rays.band)));
+                for k in 0..3 {
+                    let (a, b) = (l.mul(direction[k], near), l.mul(direction[k], far));
+                    low[k] = l.select(seen, l.min(low[k], l.min(a, b)), low[k]);
+                    high[k] = l.select(seen, l.max(high[k], l.max(a, b)), high[k]);
+                }
+            }
+        }
+        let mut bounds = [[0; 3]; 2];
+        for k in 0..3 {
+            let least = l.store(low[k]).into_iter().fold(f32::INFINITY, f32::min);
+            let most = l.store(high[k]).into_iter().fold(f32::NEG_INFINITY, f32::max);
+            // One block more to both sides, for rounding.
+            bounds[0][k] = floor(least + rays.origin[k]) - 1;
+            bounds[1][k] = floor(most + rays.origin[k]) + 1;
+        }
+        any.then_some(bounds)
+    }
+}
+
+/// The blocks that a view may touch.
+struct Grid {
+    low: [i32; 3],
+    dims: [usize; 3],
+}
+
+impl Grid {
+    /// Coordinates of the block of a cell.
+    fn block(&self, cell: usize) -> [i32; 3] {
+        let [width, height, _] = self.dims;
+        let at = [cell % width, cell / width % height, cell / width / height];
+        std::array::from_fn(|k| self.low[k] + at[k] as i32)
+    }
+}
+
+/// Finds the blocks of the band among the cells of a grid that holds them all.
+struct Mark<'a> {
+    rays: &'a Rays<'a>,
+    grid: &'a Grid,
+}
+
+impl Kernel for Mark<'_> {
+    type Output = Vec<bool>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> Vec<bool> {
+        let (rays, [width, height, _]) = (self.rays, self.grid.dims);
+        let steps = (2.0 * rays.band / rays.spacing).ceil();
+        // From the grid's first block, less a half, so that rounding takes the floor.
+        let origin: [f32; 3] = std::array::from_fn(|k| rays.origin[k] - self.grid.low[k] as f32 - 0.5);
+        let mut cells = vec![false; self.grid.dims.iter().product()];
+        for y in 1..rays.size[1].saturating_sub(1) {
+            for x in (0..rays.size[0]).step_by(LANES) {
+                let depth = rays.depths(l, x, y);
+                let seen = l.bits(l.gt(depth, l.splat(0.0)));
+                if seen == 0 {
+                    continue;
+                }
+                let sampled = seen & rays.sampled(l, x, y);
+                let direction = rays.directions(l, x, y);
+                for s in 0..=steps as usize {
+                    let at = l.add(depth, l.splat(rays.band * (2.0 * s as f32 / steps - 1.0)));
+                    let column = l.round(l.add(l.mul(direction[0], at), l.splat(origin[0])));
+                    let row = l.round(l.add(l.mul(direction[1], at), l.splat(origin[1])));
+                    let layer = l.round(l.add(l.mul(direction[2], at), l.splat(origin[2])));
+                    let (column, row) =
+                        (l.indices(column), l.indices(l.add(l.mul(layer, l.splat(height as f32)), row)));
+                    let mut left = sampled;
+                    while left != 0 {
+                        let k = left.trailing_zeros() as usize % LANES;
+                        cells[row[k] as usize * width + column[k] as usize] = true;
+                        left &= left - 1;
+                    }
+                }
+            }
+        }
+        cells
+    }
+}
