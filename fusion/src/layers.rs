@@ -352,7 +352,7 @@ mod tests {
             let (camera_from_scan, mut inside) = (pose.inverse(), 0);
             for (block, at) in field.blocks.iter().zip(&field.coords) {
                 for k in 0..VOXELS as i32 {
-                    let v = [k & 7, k >> 3 & 7, k >> 6].map(|c| f64::from(c));
+                    let v = [k & 7, k >> 3 & 7, k >> 6].map(f64::from);
                     let p: nalgebra::Point3<f64> =
                         std::array::from_fn(|i| (f64::from(8 * at[i]) + v[i]) * 0.012).into();
                     let q = camera_from_scan * p;

@@ -5,7 +5,7 @@ mod scene;
 
 use std::{collections::VecDeque, sync::Arc};
 
-use nalgebra::Vector2;
+use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 use toile_capture::{ColorImage, Frame, RgbImage, Source};
 use toile_driver_stereo::{
     Cameras, PairCounts, Pairs, Picture, Pictures, Side, SideBySide, StereoCamera, StereoDriverError, StereoSettings,
@@ -93,7 +93,7 @@ fn disparity_errors(camera: &StereoCamera, frame: &Frame) -> (f64, Vec<f64>) {
     for (i, &value) in depth.values.iter().enumerate().filter(|(_, value)| **value > 0) {
         let (u, v) = ((i % c.width as usize) as f64, (i / c.width as usize) as f64);
         let ray = Vector2::new((u - c.cx) / c.fx, (v - c.cy) / c.fy);
-        let truth = scene::depth(&made.left.rectified_from_camera, ray);
+        let truth = true_depth(&made.left.rectified_from_camera, ray);
         errors.push((focal_baseline / (f64::from(value) * sensor.depth_scale) - focal_baseline / truth).abs());
     }
     errors.sort_by(f64::total_cmp);
@@ -258,4 +258,10 @@ fn calibration_text() -> String {
     let rotation = c.right_from_left.rotation.to_rotation_matrix();
     text += &matrix("R", 3, rotation.matrix().transpose().as_slice());
     text + &matrix("T", 3, c.right_from_left.translation.vector.as_slice())
+}
+
+/// Depth in the rectified frame of the rectified ray (x, y, 1).
+fn true_depth(rectified_from_left: &Matrix3<f64>, ray: Vector2<f64>) -> f64 {
+    let direction = rectified_from_left.transpose() * Vector3::new(ray.x, ray.y, 1.0);
+    (rectified_from_left * scene::hit(Point3::origin(), direction).coords).z
 }

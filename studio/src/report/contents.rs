@@ -42,7 +42,7 @@ pub struct Contents {
     pub garments: Vec<(String, Mesh)>,
     /// Of each garment, the share of its vertices by their gap to the layers below (bins as in stacking's report).
     pub gaps: Vec<(String, Vec<f64>)>,
-    /// Cells of the table [`STACKED`], by garment.
+    /// Cells of the table of what stacking moved, by garment.
     pub stacked: Vec<Vec<String>>,
     /// All layers at some times of the motion, with a caption each.
     pub motion: Vec<(String, Vec<Mesh>)>,

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::{Isometry3, Matrix3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use toile_capture::RgbImage;
 use toile_stereo::{Lens, StereoCalibration};
 
@@ -26,7 +26,7 @@ pub fn calibration() -> StereoCalibration {
 }
 
 /// Where a ray from `origin` meets the scene, all in the left camera's frame.
-fn hit(origin: Point3<f64>, direction: Vector3<f64>) -> Point3<f64> {
+pub fn hit(origin: Point3<f64>, direction: Vector3<f64>) -> Point3<f64> {
     let (center, radius) = (Point3::new(0.05, 0.0, 1.25), 0.25);
     let to = origin - center;
     let (a, b, c) = (direction.norm_squared(), to.dot(&direction), to.norm_squared() - radius * radius);
@@ -36,12 +36,6 @@ fn hit(origin: Point3<f64>, direction: Vector3<f64>) -> Point3<f64> {
     }
     let (normal, offset) = (Vector3::new(0.25, 0.1, -1.0), -1.9);
     origin + direction * ((offset - normal.dot(&origin.coords)) / normal.dot(&direction))
-}
-
-/// Depth in the rectified frame of the rectified ray (x, y, 1).
-pub fn depth(rectified_from_left: &Matrix3<f64>, ray: Vector2<f64>) -> f64 {
-    let direction = rectified_from_left.transpose() * Vector3::new(ray.x, ray.y, 1.0);
-    (rectified_from_left * hit(Point3::origin(), direction).coords).z
 }
 
 /// What both cameras see; drawn once.
