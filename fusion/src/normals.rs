@@ -19,7 +19,7 @@ const MAX_WINDOW: usize = 8;
 /// Elements with unit normals towards the camera from central (beside unmeasured pixels one-sided) differences of
 /// range-gated, averaged depth; empty where a direction has no neighbour or the surface is seen edge-on, and along the
 /// image's border. `window` is the averaging's half width, pixels. Row by row, then empty ones up to at least
-/// [`PAGE`]. O(pixels · window).
+/// 2¹⁶. O(pixels · window).
 pub fn surface_elements(camera: &PinholeCamera, depth: &[f32], window: usize) -> Vec<Element> {
     dispatch(SurfaceElements { camera, depth, window: window.min(MAX_WINDOW) })
 }

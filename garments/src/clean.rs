@@ -114,7 +114,7 @@ pub fn keep_large_pieces(mesh: &Mesh, share: f32) -> Mesh {
 }
 
 /// The mesh without strips of a few triangles' width: threads that fusion spun across an opening. What lies within
-/// [`STRIP_REACH`] rings of a vertex further than one ring from every rim stays.
+/// `STRIP_REACH` rings of a vertex further than one ring from every rim stays.
 pub fn drop_strips(mesh: &Mesh) -> Mesh {
     let neighbors = VertexNeighbors::new(mesh.positions.len(), &mesh.triangles);
     let rims: Vec<u32> = boundary_loops(&mesh.triangles).concat();

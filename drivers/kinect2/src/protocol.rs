@@ -16,7 +16,7 @@ pub const DEPTH_PACKET_ROOM: usize = 0x8400;
 const COMMAND_MAGIC: u32 = 0x0602_2009;
 /// Begins every completion (libfreenect2 `protocol/command_transaction.h`), which has so many bytes.
 const COMPLETION_MAGIC: u32 = 0x0a6f_e000;
-/// See [`COMPLETION_MAGIC`].
+/// Length of the answer that ends a command.
 pub const COMPLETION_BYTES: usize = 16;
 /// Bytes of what follows each image of a depth packet (libfreenect2 `depth_packet_stream_parser.h`,
 /// `DepthSubPacketFooter`).
