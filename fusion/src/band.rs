@@ -25,10 +25,11 @@ pub(crate) fn touch(
 ) -> Result<Vec<bool>, FusionError> {
     let rays = Rays::new(tsdf, view, scan_from_camera, projection);
     let mut touched = vec![false; tsdf.block_count()];
-    let Some([low, high]) = dispatch(Bounds(&rays)) else { return Ok(touched) };
+    let (bounds, seen) = dispatch(Survey(&rays));
+    let Some([low, high]) = bounds else { return Ok(touched) };
     tsdf.cover(low, high)?;
     let grid = Grid { low, dims: [0, 1, 2].map(|k| (high[k] - low[k] + 1) as usize) };
-    let cells = dispatch(Mark { rays: &rays, grid: &grid });
+    let cells = dispatch(Mark { rays: &rays, grid: &grid, seen: &seen });
     for (cell, _) in cells.into_iter().enumerate().filter(|(_, marked)| *marked) {
         let slot = tsdf.slot_or_new(grid.block(cell)) as usize;
         if slot >= touched.len() {
@@ -88,26 +89,6 @@ impl<'a> Rays<'a> {
         l.keep(l.ge(depth, l.splat(self.nearest)), depth)
     }
 
-    /// Which pixels from a place in the image on are sampled: those on the rows and columns, and those beside something
-    /// that is not seen, so that rims do not depend on where rows and columns lie.
-    #[inline(always)]
-    fn sampled<L: Lanes>(&self, l: L, x: usize, y: usize) -> u32 {
-        if self.stride == 1 {
-            return u32::MAX;
-        }
-        let column = x.next_multiple_of(self.stride) - x;
-        let columns = (column..LANES).step_by(self.stride).fold(0, |bits, k| bits | 1 << k);
-        let grid = if y.is_multiple_of(self.stride) { columns } else { 0 };
-        let beside = self.seen(l, x.max(1) - 1, y) & self.seen(l, x + 1, y);
-        grid | !(beside & self.seen(l, x, y - 1) & self.seen(l, x, y + 1))
-    }
-
-    /// Which pixels from a place in the image on are to be fused.
-    #[inline(always)]
-    fn seen<L: Lanes>(&self, l: L, x: usize, y: usize) -> u32 {
-        l.bits(l.gt(self.depths(l, x, y), l.splat(0.0)))
-    }
-
     /// Directions of the rays of the pixels from a place in the image on.
     #[inline(always)]
     fn directions<L: Lanes>(&self, l: L, x: usize, y: usize) -> [L::F; 3] {
@@ -121,16 +102,51 @@ impl<'a> Rays<'a> {
     }
 }
 
-/// Least and greatest block coordinates of the band; `None` where nothing is seen.
-struct Bounds<'a>(&'a Rays<'a>);
+/// Which pixels are to be fused.
+struct Seen {
+    /// Groups of lanes in a row.
+    groups: usize,
+    bits: Vec<u16>,
+}
 
-impl Kernel for Bounds<'_> {
-    type Output = Option<[[i32; 3]; 2]>;
+impl Seen {
+    /// Which pixels of a group are sampled: those on every so many rows and columns, and those beside something that is
+    /// not seen, so that rims do not depend on where rows and columns lie.
+    #[inline(always)]
+    fn sampled(&self, group: usize, y: usize, stride: usize) -> u16 {
+        let at = y * self.groups + group;
+        let here = self.bits[at];
+        if here == 0 || stride == 1 {
+            return here;
+        }
+        let left = if group > 0 { self.bits[at - 1] } else { 0 };
+        let right = if group + 1 < self.groups { self.bits[at + 1] } else { 0 };
+        let across = (here << 1 | left >> 15) & (here >> 1 | right << 15);
+        let inside = across & self.bits[at - self.groups] & self.bits[at + self.groups];
+        let first = group * LANES;
+        let grid = if y.is_multiple_of(stride) {
+            let columns = first.next_multiple_of(stride) - first;
+            (columns..LANES).step_by(stride).fold(0, |bits, k| bits | 1 << k)
+        } else {
+            0
+        };
+        here & (grid | !inside)
+    }
+}
+
+/// Finds which pixels are to be fused, and the least and greatest block coordinates of their band; `None` where nothing
+/// is seen.
+struct Survey<'a>(&'a Rays<'a>);
+
+impl Kernel for Survey<'_> {
+    type Output = (Option<[[i32; 3]; 2]>, Seen);
 
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Self::Output {
         let rays = self.0;
         let (mut low, mut high) = ([l.splat(f32::INFINITY); 3], [l.splat(f32::NEG_INFINITY); 3]);
+        let groups = rays.size[0].div_ceil(LANES);
+        let mut bits = vec![0; groups * rays.size[1]];
         let mut any = false;
         for y in 0..rays.size[1] {
             for x in (0..rays.size[0]).step_by(LANES) {
@@ -140,6 +156,7 @@ impl Kernel for Bounds<'_> {
                     continue;
                 }
                 any = true;
+                bits[y * groups + x / LANES] = l.bits(seen) as u16;
                 let direction = rays.directions(l, x, y);
                 let (near, far) = (l.sub(depth, l.splat(rays.band)), l.add(depth, l.splat(rays.band)));
                 for k in 0..3 {
@@ -157,7 +174,7 @@ impl Kernel for Bounds<'_> {
             bounds[0][k] = floor(least + rays.origin[k]) - 1;
             bounds[1][k] = floor(most + rays.origin[k]) + 1;
         }
-        any.then_some(bounds)
+        (any.then_some(bounds), Seen { groups, bits })
     }
 }
 
@@ -180,6 +197,7 @@ impl Grid {
 struct Mark<'a> {
     rays: &'a Rays<'a>,
     grid: &'a Grid,
+    seen: &'a Seen,
 }
 
 impl Kernel for Mark<'_> {
@@ -194,12 +212,11 @@ impl Kernel for Mark<'_> {
         let mut cells = vec![false; self.grid.dims.iter().product()];
         for y in 1..rays.size[1].saturating_sub(1) {
             for x in (0..rays.size[0]).step_by(LANES) {
-                let depth = rays.depths(l, x, y);
-                let seen = l.bits(l.gt(depth, l.splat(0.0)));
-                if seen == 0 {
+                let sampled = self.seen.sampled(x / LANES, y, rays.stride);
+                if sampled == 0 {
                     continue;
                 }
-                let sampled = seen & rays.sampled(l, x, y);
+                let depth = rays.depths(l, x, y);
                 let direction = rays.directions(l, x, y);
                 for s in 0..=steps as usize {
                     let at = l.add(depth, l.splat(rays.band * (2.0 * s as f32 / steps - 1.0)));

@@ -9,7 +9,7 @@ use crate::{
     lanes::{Kernel, Lanes, dispatch},
     layers::Layers,
     projection::Projection,
-    tsdf::{Block, ColorBlock, OCTANT, SIDE, Tsdf},
+    tsdf::{Block, ColorBlock, SIDE, Tsdf},
     view::View,
 };
 
@@ -19,10 +19,16 @@ const CHUNK: usize = 32;
 /// What an integration touched.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Touched {
-    /// Voxels of the octants in the frame's truncation band.
+    /// Voxels of the slabs (half octants) in the frame's truncation band.
     pub voxels: usize,
     /// Voxels whose values the frame changed, in steps of an octant's layer.
     pub updated: usize,
+}
+
+impl Touched {
+    fn plus(self, other: Self) -> Self {
+        Self { voxels: self.voxels + other.voxels, updated: self.updated + other.updated }
+    }
 }
 
 /// Integrates `view` seen from `scan_from_camera`. Distances are to the plane of each pixel's surface element, so
@@ -35,22 +41,18 @@ pub fn integrate(tsdf: &mut Tsdf, view: &View, scan_from_camera: &Rigid) -> Resu
     let projection = Projection::new(tsdf, view, scan_from_camera);
     let touched = touch(tsdf, view, scan_from_camera, &projection)?;
     let (coords, touched, projection) = (&tsdf.coords, &touched, &projection);
-    let sum = |parts: Touched, part: Touched| Touched {
-        voxels: parts.voxels + part.voxels,
-        updated: parts.updated + part.updated,
-    };
     let all = if view.colors.is_empty() || !tsdf.has_color() {
         let chunks = tsdf.blocks.par_chunks_mut(CHUNK).enumerate();
         let update =
             |(chunk, blocks)| dispatch(UpdateBlocks { projection, coords, touched, chunk, blocks, colors: None });
-        chunks.map(update).reduce(Touched::default, sum)
+        chunks.map(update).reduce(Touched::default, Touched::plus)
     } else {
         let both = tsdf.blocks.par_chunks_mut(CHUNK).zip(tsdf.colors.par_chunks_mut(CHUNK));
         let update = |(chunk, (blocks, fields))| {
             let colors = Some((fields, view.colors.as_slice()));
             dispatch(UpdateBlocks { projection, coords, touched, chunk, blocks, colors })
         };
-        both.enumerate().map(update).reduce(Touched::default, sum)
+        both.enumerate().map(update).reduce(Touched::default, Touched::plus)
     };
     Ok(all)
 }
@@ -75,16 +77,9 @@ impl Kernel for UpdateBlocks<'_> {
         let layers = Layers::new(l, self.projection);
         let mut sum = Touched::default();
         for (k, block) in self.blocks.iter_mut().enumerate().filter(|(k, _)| self.touched[first + k]) {
-            let base = self.coords[first + k].map(|c| c * SIDE as i32);
-            let octants = layers.octants_in_band(self.projection.camera_point(base.map(|c| c as f32)));
-            sum.voxels += octants.count_ones() as usize * OCTANT.pow(3);
-            let mut colors = self.colors.as_mut().map(|(fields, pixels)| (&mut fields[k], *pixels));
-            for octant in (0..8).filter(|o| octants >> o & 1 == 1) {
-                let at = std::array::from_fn(|axis| (base[axis] + (OCTANT * (octant >> axis & 1)) as i32) as f32);
-                let start = self.projection.camera_point(at);
-                let colors = colors.as_mut().map(|(field, pixels)| (&mut **field, *pixels));
-                sum.updated += layers.update(octant, start, block, colors);
-            }
+            let colors = self.colors.as_mut().map(|(fields, pixels)| (&mut fields[k], *pixels));
+            let at = self.coords[first + k].map(|c| c * SIDE as i32);
+            sum = sum.plus(layers.update(at, block, colors));
         }
         sum
     }

@@ -4,6 +4,7 @@ use std::array::from_fn;
 
 use crate::{
     element::Element,
+    integrate::Touched,
     lanes::{LANES, Lanes},
     normals::PAGE,
     projection::Projection,
@@ -46,6 +47,15 @@ type Points<L> = [<L as Lanes>::F; 3];
 
 /// The colours of a block, and those of the view's pixels.
 type Colors<'a> = (&'a mut ColorBlock, &'a [[u8; 4]]);
+
+/// What all voxels of a block share.
+struct Place<P, L: Lanes> {
+    pixels: P,
+    /// Inverse depth of the block's centre.
+    guess: L::F,
+    /// Index of the pixel that the others are counted from.
+    offset: L::F,
+}
 
 /// Where a layer's voxels are seen.
 struct Seen<L: Lanes> {
@@ -96,59 +106,16 @@ impl<'a, L: Lanes> Layers<'a, L> {
         }
     }
 
-    /// The octants (bit x + 2 y + 4 z) of a block in the truncation band. Looked at are the centres of its cells of 2³
-    /// voxels, with room for the voxels around them. `start` is the block's first voxel in camera coordinates.
+    /// Updates the voxels of a block in the truncation band; how many lie there, and how many changed. `at` is the block's
+    /// first voxel.
     #[inline(always)]
-    pub(crate) fn octants_in_band(&self, start: [f32; 3]) -> u8 {
+    pub(crate) fn update(&self, at: [i32; 3], block: &mut Block, colors: Option<Colors<'_>>) -> Touched {
         let p = self.projection;
         let half = 0.5 * (SIDE - 1) as f32;
-        let center: [f32; 3] = from_fn(|r| start[r] + half * (p.axes[0][r] + p.axes[1][r] + p.axes[2][r]));
-        match p.page(center, SIDE) {
-            Some(first) => self.cells_in_band(Page(first), start, center[2]),
-            None => self.cells_in_band(Everywhere, start, center[2]),
-        }
-    }
-
-    #[inline(always)]
-    fn cells_in_band<P: Pixels>(&self, pixels: P, start: [f32; 3], depth: f32) -> u8 {
-        let (l, p) = (self.lanes, self.projection);
-        let (guess, offset) = (l.splat(1.0 / depth), l.splat(pixels.first() as f32));
-        let mut octants = 0;
-        for pair in 0..4 {
-            let at: [f32; 3] = from_fn(|r| {
-                start[r] + (OCTANT * (pair & 1)) as f32 * p.axes[1][r] + (OCTANT * (pair >> 1)) as f32 * p.axes[2][r]
-            });
-            let [x, y, z] = self.cells;
-            let points = [l.add(l.splat(at[0]), x), l.add(l.splat(at[1]), y), l.add(l.splat(at[2]), z)];
-            let seen = self.look_up(&points, guess, offset);
-            let [depth, facing, nx, ny] = l.unpack(pixels.fetch(p.elements, &seen.index));
-            let to_plane = self.to_plane(l.sub(depth, points[2]), facing, [nx, ny], &points, &seen);
-            // Half a pixel further the plane is so much nearer or farther.
-            let tilt = l.add(l.mul(l.abs(nx), self.pitch[0]), l.mul(l.abs(ny), self.pitch[1]));
-            let room = l.add(self.cell_radius, l.mul(l.splat(0.5), l.mul(points[2], tilt)));
-            let band = l.sub(room, l.mul(facing, self.truncation[0]));
-            let bits = l.bits(l.and(l.ge(band, l.abs(to_plane)), l.ge(depth, self.nearest)));
-            octants |= (u8::from(bits & 0xFF != 0) | u8::from(bits >> 8 != 0) << 1) << (2 * pair);
-        }
-        octants
-    }
-
-    /// Updates an octant of a block whose first voxel lies at `start`, camera coordinates (x and y times the focal
-    /// lengths). Returns how many voxels changed.
-    #[inline(always)]
-    pub(crate) fn update(
-        &self,
-        octant: usize,
-        start: [f32; 3],
-        block: &mut Block,
-        colors: Option<Colors<'_>>,
-    ) -> usize {
-        let p = self.projection;
-        let half = 0.5 * (OCTANT - 1) as f32;
-        let center: [f32; 3] = from_fn(|r| start[r] + half * (p.axes[0][r] + p.axes[1][r] + p.axes[2][r]));
-        match p.page(center, OCTANT) {
-            Some(first) => self.update_from(Page(first), octant, start, center[2], block, colors),
-            None => self.update_from(Everywhere, octant, start, center[2], block, colors),
+        let center = p.camera_point(at.map(|c| c as f32 + half));
+        match p.page(center) {
+            Some(first) => self.update_from(Page(first), at, center[2], block, colors),
+            None => self.update_from(Everywhere, at, center[2], block, colors),
         }
     }
 
@@ -156,22 +123,73 @@ impl<'a, L: Lanes> Layers<'a, L> {
     fn update_from<P: Pixels>(
         &self,
         pixels: P,
-        octant: usize,
-        start: [f32; 3],
+        at: [i32; 3],
         depth: f32,
         block: &mut Block,
         mut colors: Option<Colors<'_>>,
-    ) -> usize {
+    ) -> Touched {
         let l = self.lanes;
-        let (guess, offset) = (l.splat(1.0 / depth), l.splat(pixels.first() as f32));
+        let place = Place { pixels, guess: l.splat(1.0 / depth), offset: l.splat(pixels.first() as f32) };
+        let slabs = self.slabs_in_band(&place, at);
+        let mut updated = 0;
+        for octant in (0..8).filter(|o| slabs >> (2 * o) & 3 != 0) {
+            let first = from_fn(|axis| (at[axis] + (OCTANT * (octant >> axis & 1)) as i32) as f32);
+            let colors = colors.as_mut().map(|(field, image)| (&mut **field, *image));
+            updated += self.update_octant(&place, octant, slabs, first, block, colors);
+        }
+        Touched { voxels: slabs.count_ones() as usize * OCTANT.pow(3) / 2, updated }
+    }
+
+    /// The slabs of a block in the truncation band, bit by bit: of each octant, in their order, the lower and the upper half.
+    /// Looked at are the centres of its cells of 2³ voxels, with room for the voxels around them.
+    #[inline(always)]
+    fn slabs_in_band<P: Pixels>(&self, place: &Place<P, L>, at: [i32; 3]) -> u16 {
+        let (l, p) = (self.lanes, self.projection);
+        let mut slabs = 0;
+        for pair in 0..4 {
+            let first = [at[0], at[1] + (OCTANT * (pair & 1)) as i32, at[2] + (OCTANT * (pair >> 1)) as i32];
+            let start = p.camera_point(first.map(|c| c as f32));
+            let [x, y, z] = self.cells;
+            let points = [l.add(l.splat(start[0]), x), l.add(l.splat(start[1]), y), l.add(l.splat(start[2]), z)];
+            let seen = self.look_up(&points, place.guess, place.offset);
+            let [depth, facing, nx, ny] = l.unpack(place.pixels.fetch(p.elements, &seen.index));
+            let to_plane = self.to_plane(l.sub(depth, points[2]), facing, [nx, ny], &points, &seen);
+            // Half a pixel further the plane is so much nearer or farther.
+            let tilt = l.add(l.mul(l.abs(nx), self.pitch[0]), l.mul(l.abs(ny), self.pitch[1]));
+            let room = l.add(self.cell_radius, l.mul(l.splat(0.5), l.mul(points[2], tilt)));
+            let band = l.sub(room, l.mul(facing, self.truncation[0]));
+            let bits = l.bits(l.and(l.ge(band, l.abs(to_plane)), l.ge(depth, self.nearest)));
+            // A slab is four cells.
+            let any = bits | bits >> 1;
+            let any = any | any >> 2;
+            slabs |= (((any & 1) | (any >> 3 & 2) | (any >> 6 & 4) | (any >> 9 & 8)) as u16) << (4 * pair);
+        }
+        slabs
+    }
+
+    /// Updates an octant's slabs among these. `first` is the octant's first voxel. Returns how many voxels changed.
+    #[inline(always)]
+    fn update_octant<P: Pixels>(
+        &self,
+        place: &Place<P, L>,
+        octant: usize,
+        slabs: u16,
+        first: [f32; 3],
+        block: &mut Block,
+        mut colors: Option<Colors<'_>>,
+    ) -> usize {
+        let (l, pixels, start) = (self.lanes, place.pixels, self.projection.camera_point(first));
         let [x, y, z] = self.steps;
         let mut points = [l.add(l.splat(start[0]), x), l.add(l.splat(start[1]), y), l.add(l.splat(start[2]), z)];
         let mut updated = 0;
         for layer in octant * OCTANT..(octant + 1) * OCTANT {
-            let seen = self.look_up(&points, guess, offset);
-            let measured = self.measure(pixels.fetch(self.projection.elements, &seen.index), &points, &seen);
-            let [x, y, z] = points;
-            points = [l.add(x, self.up[0]), l.add(y, self.up[1]), l.add(z, self.up[2])];
+            let here = points;
+            points = [l.add(here[0], self.up[0]), l.add(here[1], self.up[1]), l.add(here[2], self.up[2])];
+            if slabs >> (layer / 2) & 1 == 0 {
+                continue;
+            }
+            let seen = self.look_up(&here, place.guess, place.offset);
+            let measured = self.measure(pixels.fetch(self.projection.elements, &seen.index), &here, &seen);
             if !l.any(measured.counts) {
                 continue;
             }
@@ -187,8 +205,8 @@ impl<'a, L: Lanes> Layers<'a, L> {
         updated
     }
 
-    /// What lies outside the image is seen on its border, which is empty. `guess` is the inverse depth of the octant's
-    /// centre: two of Newton's steps from there are exact to the fourth power of an octant's share of the depth.
+    /// What lies outside the image is seen on its border, which is empty. `guess` is the inverse depth of the block's
+    /// centre: two of Newton's steps from there are exact to the fourth power of half a block's share of the depth.
     #[inline(always)]
     fn look_up(&self, [x, y, z]: &Points<L>, guess: L::F, offset: L::F) -> Seen<L> {
         let (l, zero, two) = (self.lanes, self.lanes.splat(0.0), self.lanes.splat(2.0));
@@ -269,7 +287,7 @@ impl<'a, L: Lanes> Layers<'a, L> {
     }
 }
 
-/// The pixels among which an octant's voxels look up theirs, counted from one of them.
+/// The pixels among which a block's voxels look up theirs, counted from one of them.
 trait Pixels: Copy {
     /// Index of the pixel that they are counted from.
     fn first(self) -> usize;
@@ -344,7 +362,7 @@ mod tests {
     /// Every voxel of touched blocks about which a pixel says something within the band is updated: compared with a plain
     /// loop over all voxels. The rim may be a voxel off.
     #[test]
-    fn octants_in_the_band_hold_all_voxels_in_the_band() {
+    fn slabs_in_the_band_hold_all_voxels_in_the_band() {
         for focal in [110.0, 200.0, 400.0] {
             let (view, pose) = wall(focal);
             let mut field = Tsdf::new(0.012, 0.048, false);
@@ -386,11 +404,7 @@ mod tests {
         let mut changed = 0;
         for (found, at) in field.blocks.iter().zip(&field.coords) {
             let mut plain = Block::EMPTY;
-            let octants = layers.octants_in_band(projection.camera_point(at.map(|c| (8 * c) as f32)));
-            for octant in (0..8).filter(|o| octants >> o & 1 == 1) {
-                let first = std::array::from_fn(|k| (8 * at[k] + 4 * (octant >> k & 1) as i32) as f32);
-                changed += layers.update(octant, projection.camera_point(first), &mut plain, None);
-            }
+            changed += layers.update(at.map(|c| c * SIDE as i32), &mut plain, None).updated;
             assert!(plain.sdf == found.sdf && plain.weight == found.weight, "block {at:?}");
         }
         assert!(changed > 2000);

@@ -60,11 +60,11 @@ impl<'a> Projection<'a> {
         std::array::from_fn(|r| self.origin[r] + a[r] * voxel[0] + b[r] * voxel[1] + c[r] * voxel[2])
     }
 
-    /// Index of the first of [`PAGE`] pixels among which all those lie that see a cube of `side`³ voxels around a camera
-    /// point; `None` where they are too many.
+    /// Index of the first of [`PAGE`] pixels among which all those lie that see the block around a camera point;
+    /// `None` where they are too many.
     #[inline(always)]
-    pub(crate) fn page(&self, center: [f32; 3], side: usize) -> Option<usize> {
-        let radius = 0.5 * 3f32.sqrt() * (side - 1) as f32 * self.voxel_size;
+    pub(crate) fn page(&self, center: [f32; 3]) -> Option<usize> {
+        let radius = 0.5 * 3f32.sqrt() * (SIDE - 1) as f32 * self.voxel_size;
         // Pixels, with one more for rounding.
         let reach = radius / ((center[2] - radius) * self.pitch[1]) + 1.5;
         let rows = 2.0 * reach + 2.0;
