@@ -76,7 +76,7 @@ impl<'a> Rays<'a> {
             columns: (0..projection.size[0]).map(|u| ray(u, 0)).collect(),
             rows: (0..projection.size[1]).map(|v| ray(v, 1)).collect(),
             band: tsdf.truncation() + tsdf.voxel_size(),
-            stride: ((0.5 * block / (projection.pitch[1] * view.mean_depth())) as usize).clamp(1, 4),
+            stride: ((0.5 * block / (projection.pitch[1] * view.farthest())) as usize).clamp(1, 4),
         }
     }
 
@@ -228,7 +228,10 @@ impl Kernel for Mark<'_> {
                     let mut left = sampled;
                     while left != 0 {
                         let k = left.trailing_zeros() as usize % LANES;
-                        cells[row[k] as usize * width + column[k] as usize] = true;
+                        // Beyond the grid only where coordinates are too large for their digits.
+                        if let Some(cell) = cells.get_mut(row[k] as usize * width + column[k] as usize) {
+                            *cell = true;
+                        }
                         left &= left - 1;
                     }
                 }

@@ -67,10 +67,15 @@ impl Fuser {
             tidy(&crossings)
         });
         report.triangles_raw = raw.triangles.len();
+        if raw.triangles.is_empty() {
+            return Err(FusionError::NobodyInIt { reason: "the fused frames make no surface".into() });
+        }
         let placed = self.place(&raw, &mut report);
         let mesh = raw.transformed(&placed);
         drop(raw);
-        let (settings, on_floor) = (&self.settings, self.volume.as_ref().is_some_and(|v| v.floor.is_some()));
+        // Known poses keep their own frame, whose zero is no floor.
+        let on_floor = self.settings.poses.is_none() && self.volume.as_ref().is_some_and(|v| v.floor.is_some());
+        let settings = &self.settings;
         let (mesh, cleaned) = self.clock.time("clean up", || clean_up(mesh, settings, on_floor));
         report.triangles = mesh.triangles.len();
         report.holes_filled = cleaned.holes;

@@ -148,6 +148,9 @@ impl Fuser {
         }
         let window = self.window;
         let view = self.clock.time("normals", || prepared.view(window));
+        if self.kept.is_empty() && view.count() < LEAST_PIXELS {
+            return Ok(self.drop_frame(frame, "too little surface to begin with".into()));
+        }
         let found = match self.locate(frame, &view) {
             Ok(found) => found,
             Err(reason) => return Ok(self.drop_frame(frame, reason)),
@@ -247,7 +250,8 @@ impl Fuser {
             self.lost.frames = 0;
             return Ok((tracked.scan_from_camera, Some(tracked)));
         };
-        if self.lost.frames <= PATIENCE
+        // Without an axis there is nothing to search about.
+        if (self.lost.frames <= PATIENCE || self.motion.axis().is_none())
             && let Ok(found) = self.relocalise(view, &predicted, String::new())
         {
             self.lost.frames = 0;

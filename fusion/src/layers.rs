@@ -14,6 +14,9 @@ use crate::{
 /// Colour is taken this far from the surface, voxels: what extraction reads, and a little for surfaces that move.
 const COLOR_VOXELS: f32 = 2.0;
 
+/// Most of a block's radius, as a share of its depth, at which inverse depths follow from its centre's.
+const NEAR: f32 = 0.1;
+
 // The lanes are one layer of an octant.
 const _: () = assert!(OCTANT * OCTANT == LANES);
 
@@ -51,8 +54,8 @@ type Colors<'a> = (&'a mut ColorBlock, &'a [[u8; 4]]);
 /// What all voxels of a block share.
 struct Place<P, L: Lanes> {
     pixels: P,
-    /// Inverse depth of the block's centre.
-    guess: L::F,
+    /// Inverse depth of the block's centre, from which those of its voxels follow unless it is too near.
+    guess: Option<L::F>,
     /// Index of the pixel that the others are counted from.
     offset: L::F,
 }
@@ -129,7 +132,8 @@ impl<'a, L: Lanes> Layers<'a, L> {
         mut colors: Option<Colors<'_>>,
     ) -> Touched {
         let l = self.lanes;
-        let place = Place { pixels, guess: l.splat(1.0 / depth), offset: l.splat(pixels.first() as f32) };
+        let guess = (self.projection.block_radius < NEAR * depth).then(|| l.splat(1.0 / depth));
+        let place = Place { pixels, guess, offset: l.splat(pixels.first() as f32) };
         let slabs = self.slabs_in_band(&place, at);
         let mut updated = 0;
         for octant in (0..8).filter(|o| slabs >> (2 * o) & 3 != 0) {
@@ -205,13 +209,18 @@ impl<'a, L: Lanes> Layers<'a, L> {
         updated
     }
 
-    /// What lies outside the image is seen on its border, which is empty. `guess` is the inverse depth of the block's
-    /// centre: two of Newton's steps from there are exact to the fourth power of half a block's share of the depth.
+    /// What lies outside the image is seen on its border, which is empty. From a guess, two of Newton's steps are exact to
+    /// the fourth power of half a block's share of the depth: a thirtieth of a pixel at worst.
     #[inline(always)]
-    fn look_up(&self, [x, y, z]: &Points<L>, guess: L::F, offset: L::F) -> Seen<L> {
-        let (l, zero, two) = (self.lanes, self.lanes.splat(0.0), self.lanes.splat(2.0));
-        let near = l.mul(guess, l.sub(two, l.mul(*z, guess)));
-        let inverse = l.mul(near, l.sub(two, l.mul(*z, near)));
+    fn look_up(&self, [x, y, z]: &Points<L>, guess: Option<L::F>, offset: L::F) -> Seen<L> {
+        let (l, zero, one, two) = (self.lanes, self.lanes.splat(0.0), self.lanes.splat(1.0), self.lanes.splat(2.0));
+        let inverse = match guess {
+            Some(guess) => {
+                let near = l.mul(guess, l.sub(two, l.mul(*z, guess)));
+                l.mul(near, l.sub(two, l.mul(*z, near)))
+            }
+            None => l.div(one, *z),
+        };
         let exact = [l.add(l.mul(*x, inverse), self.center[0]), l.add(l.mul(*y, inverse), self.center[1])];
         let u = l.round(l.min(l.max(exact[0], zero), self.last[0]));
         let v = l.round(l.min(l.max(exact[1], zero), self.last[1]));

@@ -162,6 +162,8 @@ fn normals<L: Lanes>(l: L, smooth: &Padded, at: usize, rays: &Rays, x: usize, y:
     let cosine = l.mul(l.sqrt(squared(l, [rx, ry, one])), l.splat(-MIN_COSINE));
     let spans = l.and(l.and(has_across, has_down), l.gt(d, l.splat(0.0)));
     let good = l.and(spans, l.and(l.ge(cosine, facing), l.gt(length, l.splat(1e-12))));
+    // As far as elements tell: rays of more than 60° aside do not count for more.
+    let facing = l.max(facing, l.splat(-2.0));
     [l.keep(good, facing), l.keep(good, l.mul(n[0], inverse)), l.keep(good, l.mul(n[1], inverse))]
 }
 

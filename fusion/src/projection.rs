@@ -29,6 +29,8 @@ pub(crate) struct Projection<'a> {
     pub truncation: f32,
     pub voxel_size: f32,
     pub unit: f32,
+    /// Distance from a block's centre to its farthest voxel, metres.
+    pub block_radius: f32,
 }
 
 impl<'a> Projection<'a> {
@@ -50,6 +52,7 @@ impl<'a> Projection<'a> {
             truncation: tsdf.truncation(),
             voxel_size: voxel,
             unit: tsdf.unit(),
+            block_radius: 0.5 * 3f32.sqrt() * (SIDE - 1) as f32 * voxel,
         }
     }
 
@@ -64,7 +67,7 @@ impl<'a> Projection<'a> {
     /// `None` where they are too many.
     #[inline(always)]
     pub(crate) fn page(&self, center: [f32; 3]) -> Option<usize> {
-        let radius = 0.5 * 3f32.sqrt() * (SIDE - 1) as f32 * self.voxel_size;
+        let radius = self.block_radius;
         // Pixels, with one more for rounding.
         let reach = radius / ((center[2] - radius) * self.pitch[1]) + 1.5;
         let rows = 2.0 * reach + 2.0;

@@ -40,7 +40,7 @@ pub struct KnownPose {
 pub struct FusionSettings {
     /// Edge of a voxel, metres. Default 0.004. Smaller resolves more and costs its inverse square.
     pub voxel_size: f64,
-    /// Truncation distance of the signed distance field, metres. Default 0.016; at least three voxels.
+    /// Truncation distance of the signed distance field, metres. Default 0.016; at least two voxels.
     pub truncation: f64,
     /// What is fused. Default: the subject alone.
     pub volume: Volume,

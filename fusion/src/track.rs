@@ -98,7 +98,7 @@ pub(crate) struct Normal {
 
 /// Samples of a view, thinned to about `count`.
 pub fn samples(view: &View, count: usize) -> Vec<Sample> {
-    let all = view.elements.iter().filter(|e| e.is_some()).count();
+    let all = view.count();
     let stride = ((all as f64 / count.max(1) as f64).sqrt().round() as usize).max(1);
     view.samples(stride)
         .filter_map(|i| {

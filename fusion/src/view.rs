@@ -87,10 +87,15 @@ impl View {
         self.camera.width as usize * self.camera.height as usize
     }
 
-    /// Mean depth of the elements, metres; 1 of none.
-    pub fn mean_depth(&self) -> f32 {
-        let (sum, count) = self.samples(5).fold((0.0, 0), |(s, n), i| (s + f64::from(self.elements[i].depth()), n + 1));
-        if count == 0 { 1.0 } else { (sum / f64::from(count)) as f32 }
+    /// Number of surface elements.
+    pub fn count(&self) -> usize {
+        self.elements.iter().filter(|e| e.is_some()).count()
+    }
+
+    /// Greatest depth of the elements (every third is looked at), metres; 1 of none.
+    pub fn farthest(&self) -> f32 {
+        let far = self.samples(3).map(|i| self.elements[i].depth()).fold(0.0, f32::max);
+        if far > 0.0 { far } else { 1.0 }
     }
 
     /// The point of pixel `i`, camera frame; meaningless where the element is empty.
@@ -137,7 +142,11 @@ impl View {
         self.colors = vec![[0; 4]; self.elements.len()];
         for i in (0..self.pixels()).filter(|i| self.elements[*i].is_some()) {
             let p = color_from_depth * nalgebra::Point3::from(self.point(i)).cast::<f64>();
-            if let Some(q) = camera.project(&p) {
+            let inside = |q: &nalgebra::Point2<f64>| {
+                let last = [f64::from(camera.width) - 0.5, f64::from(camera.height) - 0.5];
+                q.x >= -0.5 && q.y >= -0.5 && q.x <= last[0] && q.y <= last[1]
+            };
+            if let Some(q) = camera.project(&p).filter(inside) {
                 let [r, g, b] = bilinear(image, (q.x * sx) as f32, (q.y * sy) as f32);
                 self.colors[i] = [r, g, b, 255];
             }

@@ -19,7 +19,8 @@ verdict() { # name, true where it streamed, what it said
 serve() { # example, product id, words
     local example=$1 product=$2
     shift 2
-    "$bin/examples/$example" serve "$@" & server=$!
+    # The model waits for its client, not the other way round: one processor has to do for both.
+    nice -n 19 "$bin/examples/$example" serve "$@" & server=$!
     for _ in $(seq 100); do grep -q "$product" /sys/bus/usb/devices/*/idProduct && return; sleep 0.2; done
 }
 gone() {
