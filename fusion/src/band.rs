@@ -52,7 +52,7 @@ struct Rays<'a> {
     rows: Vec<f32>,
     /// Half the band's width, metres.
     band: f32,
-    /// Half a block, metres: samples lie no farther apart.
+    /// Half a block, metres: along the camera's axis samples lie no farther apart.
     spacing: f32,
     /// Every so many rows and columns of pixels are sampled.
     stride: usize,

@@ -20,7 +20,7 @@ impl Element {
     /// No surface.
     pub const EMPTY: Self = Self(0);
 
-    /// Packs; the facing must lie within (−2, 0], the normal's coordinates within ±1.
+    /// Packs; the facing must lie within [−2, 0], the normal's coordinates within ±1.
     #[inline]
     pub fn new(depth: f32, facing: f32, [nx, ny]: [f32; 2]) -> Self {
         let whole = |a: f32, scale: f32| (a * scale).round_ties_even() as i32;
