@@ -81,7 +81,7 @@ pub struct Health {
     pub alone: [u64; 2],
     /// Pictures that came and could not be read.
     pub broken: u64,
-    /// Pictures that came without the camera's time.
+    /// Pictures that came without the camera's time, which are lost while it tells that of others.
     pub without_time: u64,
     /// How often the streams were switched off and on.
     pub restarts: u32,
@@ -89,8 +89,8 @@ pub struct Health {
 
 /// How long one stream is waited for before the other is looked at.
 const TURN: Duration = Duration::from_millis(5);
-/// So many pictures without a time mean that there will be none.
-const MOST_WITHOUT_TIME: u64 = 10;
+/// So many pictures of a stream in a row without a time mean that there will be none.
+const MOST_WITHOUT_TIME: u32 = 10;
 /// Nanoseconds of a microsecond.
 const MICROSECOND: i64 = 1000;
 
@@ -251,16 +251,17 @@ impl Realsense {
         tracing::warn!("RealSense: a {what} picture cannot be read: {reason}");
     }
 
-    /// Time of a picture by the camera's clock, or by the kernel's where there is no metadata at all. `None` for the
-    /// first pictures of a stream whose time is not told yet.
+    /// Time of a picture by the camera's clock, or by the kernel's where there is no metadata at all. `None` where it is
+    /// not told: a guess could pair depth with the colour of another moment, so that picture is a lost one.
     fn time(&mut self, stream: usize, shot: &Shot) -> Option<i64> {
         let clock = &mut self.clocks[stream];
         self.health.lost_pictures[stream] += clock.lost(shot.buffer.sequence);
         let told = if self.has_device_time { shot.metadata.time_us } else { None };
         self.health.without_time += u64::from(told.is_none());
-        if self.has_device_time && told.is_none() && clock.last.is_none() {
+        clock.untold = if told.is_none() { clock.untold + 1 } else { 0 };
+        if self.has_device_time && told.is_none() {
             self.health.lost_pictures[stream] += 1;
-            if self.health.without_time >= MOST_WITHOUT_TIME {
+            if clock.untold >= MOST_WITHOUT_TIME {
                 tracing::warn!("RealSense: the camera tells no time; the kernel's is used");
                 self.has_device_time = false;
                 self.rig.sensors.iter_mut().for_each(|s| s.identity.clock = ClockDomain::HostMonotonic);
@@ -389,6 +390,8 @@ struct Clock {
     /// The camera's time, the kernel's and ours of the last picture.
     last: Option<(u32, i64, i64)>,
     sequence: Option<u32>,
+    /// Pictures in a row whose time was not told.
+    untold: u32,
 }
 
 /// Steps of the camera's clock that cannot be, seconds: it began anew, or says nonsense.
@@ -396,7 +399,7 @@ const MOST_STEP: f64 = 60.0;
 
 impl Clock {
     fn new(period: i64) -> Self {
-        Self { period, last: None, sequence: None }
+        Self { period, last: None, sequence: None, untold: 0 }
     }
 
     fn restart(&mut self) {

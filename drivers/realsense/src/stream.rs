@@ -15,6 +15,9 @@ use crate::{
 
 /// How long the metadata of a picture that is here is waited for: it is written before the picture is done.
 const METADATA_LIMIT: Duration = Duration::from_millis(50);
+/// Buffers of metadata: more than pictures have, because the kernel fills some for pictures that it drops, and one that
+/// finds none free is lost (VIDEO_MAX_FRAME of `linux/videodev2.h`).
+const METADATA_BUFFERS: u32 = 32;
 /// Metadata that may wait for its picture.
 const MOST_WAITING: usize = 64;
 
@@ -95,7 +98,7 @@ impl Stream {
         self.waiting.clear();
         // Metadata first, so that it has the first picture's too.
         if let Some((metadata, _)) = &mut self.metadata {
-            metadata.start(self.buffers)?;
+            metadata.start(self.buffers.max(METADATA_BUFFERS))?;
         }
         self.pictures.start(self.buffers)?;
         Ok(())

@@ -99,6 +99,43 @@ fn a_time_that_cannot_be_is_replaced_by_the_kernels() {
     }
 }
 
+/// By bulk the camera runs ahead of the kernel's clock: pictures whose time is guessed would find the wrong partner.
+#[test]
+fn a_picture_whose_time_is_not_told_is_lost_and_counted() {
+    let untold: Vec<_> = (2..=4).map(|frame| depth_fault(frame, 0, StreamFault::NoTime)).collect();
+    for wire in [Wire::Bulk, Wire::Isochronous] {
+        let mut camera = faulty(wire, &untold);
+        let (frames, _) = take(&mut camera, 8);
+        for (frame, k) in frames.iter().zip(0..) {
+            assert_eq!((frame.device_frame, frame.lost_before), (k, 0), "{wire:?}");
+            assert!(
+                has_color_of(frame, k) && frame.depth.is_some() != untold.iter().any(|f| f.frame == k),
+                "{wire:?} {k}"
+            );
+            assert!(frame.depth.is_none() || has_depth_of(frame, k), "{wire:?} {k}");
+        }
+        let health = camera.health();
+        assert_eq!((health.without_time, health.lost_pictures, health.alone), (3, [3, 0], [0, 3]), "{wire:?}");
+    }
+}
+
+/// A camera that tells no more time at all goes on by the kernel's clock.
+#[test]
+fn a_clock_that_falls_silent_is_replaced_by_the_kernels() {
+    let untold =
+        (3..100).flat_map(|k| [depth_fault(k, 0, StreamFault::NoTime), color_fault(k, 0, StreamFault::NoTime)]);
+    let mut camera = faulty(Wire::Isochronous, &untold.collect::<Vec<_>>());
+    let (frames, error) = take(&mut camera, 12);
+    assert!(error.is_none(), "{error:?}");
+    for frame in &frames {
+        assert!(frame.depth.is_none() || has_depth_of(frame, frame.device_frame), "{}", frame.device_frame);
+        assert!(frame.color.is_none() || has_color_of(frame, frame.device_frame), "{}", frame.device_frame);
+    }
+    assert!(frames.iter().filter(|f| f.depth.is_none() || f.color.is_none()).count() <= 1);
+    let lost: u32 = frames.iter().map(|f| f.lost_before).sum();
+    assert!((8..13).contains(&lost), "{lost}");
+}
+
 #[test]
 fn a_silent_or_halted_stream_is_woken_once_and_then_told() {
     for (wire, what) in

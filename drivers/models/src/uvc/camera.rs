@@ -170,7 +170,7 @@ impl<S: Scene> UvcModel<S> {
             let length = match fault.what {
                 StreamFault::Lost(n) | StreamFault::Damaged(n) => n,
                 StreamFault::Late(_) => 0,
-                StreamFault::Time(_) => usize::MAX,
+                StreamFault::Time(_) | StreamFault::NoTime => usize::MAX,
                 _ => 1,
             };
             let here = fault.packet..fault.packet.saturating_add(length);

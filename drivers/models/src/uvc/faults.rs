@@ -34,6 +34,8 @@ pub enum StreamFault {
     ErrorBit,
     /// The camera tells this time instead of the frame's, microseconds.
     Time(u32),
+    /// The camera tells no time of the frame.
+    NoTime,
     /// Nothing comes any more, until the stream is switched off and on.
     Silent,
     /// The endpoint refuses.

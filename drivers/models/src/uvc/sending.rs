@@ -28,13 +28,17 @@ impl Sending {
     fn header(&self, is_first: bool, is_last: bool, fault: Option<StreamFault>) -> Vec<u8> {
         let extra = if is_first { &self.extra[..] } else { &[] };
         let time = if let Some(StreamFault::Time(time)) = fault { time } else { self.time };
-        let mut flags = END_OF_HEADER | HAS_TIME | HAS_CLOCK | (self.number & 1) as u8;
+        let has_time = fault != Some(StreamFault::NoTime);
+        let mut flags = END_OF_HEADER | HAS_CLOCK | (self.number & 1) as u8 | if has_time { HAS_TIME } else { 0 };
         flags |= if is_last { END } else { 0 } | if fault == Some(StreamFault::ErrorBit) { ERROR } else { 0 };
-        let mut header = vec![(12 + extra.len()) as u8, flags];
-        header.extend(time.to_le_bytes());
+        let mut header = vec![0, flags];
+        if has_time {
+            header.extend(time.to_le_bytes());
+        }
         header.extend(time.to_le_bytes());
         header.extend(((self.number * 33 % 2048) as u16).to_le_bytes());
         header.extend(extra);
+        header[0] = header.len() as u8;
         if let Some(StreamFault::HeaderLength(length)) = fault {
             header[0] = length;
         }

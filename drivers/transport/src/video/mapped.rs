@@ -8,7 +8,12 @@
 //!   a buffer alone between dequeuing and queuing it.
 #![allow(unsafe_code)]
 
-use std::{ffi::c_void, io, mem, ptr, slice, sync::Arc, time::Duration};
+use std::{
+    ffi::c_void,
+    io, mem, ptr, slice,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use v4l::{
     device::Handle,
@@ -56,25 +61,34 @@ impl Mapped {
         Ok(stream)
     }
 
-    /// The next full buffer, copied; its memory is the kernel's again.
+    /// The next full buffer, copied; its memory is the kernel's again. One that the driver flags as damaged is passed over:
+    /// `uvcvideo` gives such pictures where its parameter `nodrop` is set, as newer kernels do by default.
     pub(super) fn next(&mut self, limit: Duration) -> io::Result<VideoBuffer> {
-        let milliseconds = i32::try_from(limit.as_millis()).unwrap_or(i32::MAX);
-        if self.handle.poll(POLLIN, milliseconds)? == 0 {
-            return Err(io::ErrorKind::TimedOut.into());
+        let start = Instant::now();
+        loop {
+            let left = limit.saturating_sub(start.elapsed());
+            let milliseconds = i32::try_from(left.as_millis()).unwrap_or(i32::MAX);
+            if self.handle.poll(POLLIN, milliseconds)? == 0 {
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            if let Some(buffer) = self.take()? {
+                return Ok(buffer);
+            }
         }
+    }
+
+    /// Takes a buffer that is full; `None` where it is damaged.
+    fn take(&mut self) -> io::Result<Option<VideoBuffer>> {
         let mut buffer = self.buffer(0);
         self.call(vidioc::VIDIOC_DQBUF, &mut buffer)?;
         let (map, length) = *self.maps.get(buffer.index as usize).ok_or(io::ErrorKind::InvalidData)?;
-        let used = length.min(buffer.bytesused as usize);
+        let is_damaged = buffer.flags & FLAG_ERROR != 0;
+        let used = if is_damaged { 0 } else { length.min(buffer.bytesused as usize) };
         // SAFETY: *mapped*: `used` bytes from the start of a mapping, of a buffer that is dequeued.
         let bytes = unsafe { slice::from_raw_parts(map.cast::<u8>(), used) }.to_vec();
         self.call(vidioc::VIDIOC_QBUF, &mut self.buffer(buffer.index))?;
-        Ok(VideoBuffer {
-            bytes,
-            sequence: buffer.sequence,
-            time_ns: buffer.timestamp.tv_sec * 1_000_000_000 + buffer.timestamp.tv_usec * 1000,
-            is_damaged: buffer.flags & FLAG_ERROR != 0,
-        })
+        let time_ns = buffer.timestamp.tv_sec * 1_000_000_000 + buffer.timestamp.tv_usec * 1000;
+        Ok((!is_damaged).then_some(VideoBuffer { bytes, sequence: buffer.sequence, time_ns }))
     }
 
     fn request(&self, count: u32) -> io::Result<u32> {

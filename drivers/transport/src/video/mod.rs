@@ -96,7 +96,8 @@ pub struct PictureLayout {
     pub stride: u32,
 }
 
-/// What the driver filled.
+/// What the driver filled. Buffers of which it knows that bytes are missing are kept from callers; their numbers are
+/// missing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VideoBuffer {
     /// The picture, or metadata.
@@ -105,8 +106,6 @@ pub struct VideoBuffer {
     pub sequence: u32,
     /// The host's monotonic clock at the picture's first byte, nanoseconds.
     pub time_ns: i64,
-    /// The driver knows that bytes are missing.
-    pub is_damaged: bool,
 }
 
 /// All video nodes of a machine.

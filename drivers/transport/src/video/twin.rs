@@ -249,8 +249,7 @@ impl Flow {
             if sent.is_damaged {
                 continue;
             }
-            let buffer =
-                |bytes| VideoBuffer { bytes, sequence: sent.sequence, time_ns: sent.time_ns, is_damaged: false };
+            let buffer = |bytes| VideoBuffer { bytes, sequence: sent.sequence, time_ns: sent.time_ns };
             if self.metadata.len() < self.room[1] {
                 self.metadata.push_back(buffer(sent.metadata));
             }
