@@ -223,18 +223,12 @@ impl Kinect2 {
         if room < DEPTH_PACKET_ROOM {
             return Err(Kinect2Error::SlowLink);
         }
-        let memory = |error: TransportError| match error {
-            TransportError::Failed { source: rusb_error, .. } if rusb_error.to_string().contains("memory") => {
-                Kinect2Error::Memory(error)
-            }
-            other => other.into(),
-        };
         for _ in 0..self.settings.transfers.max(1) {
-            self.device.submit(Transfer::isochronous(DEPTH_ENDPOINT, room, DEPTH_PACKETS)).map_err(memory)?;
+            self.device.submit(Transfer::isochronous(DEPTH_ENDPOINT, room, DEPTH_PACKETS)).map_err(advised)?;
         }
         let colors = if self.settings.color == ColorMode::Off { 0 } else { COLOR_TRANSFERS };
         for _ in 0..colors {
-            self.device.submit(Transfer::bulk(COLOR_ENDPOINT, COLOR_TRANSFER)).map_err(memory)?;
+            self.device.submit(Transfer::bulk(COLOR_ENDPOINT, COLOR_TRANSFER)).map_err(advised)?;
         }
         Ok(())
     }
@@ -251,8 +245,7 @@ impl Kinect2 {
         } else {
             self.take_color(&transfer)?;
         }
-        self.device.submit(transfer)?;
-        Ok(())
+        self.device.submit(transfer).map_err(advised)
     }
 
     fn take_depth(&mut self, transfer: &Transfer) {
@@ -458,6 +451,16 @@ fn rig(identity: Identity, calibration: &Calibration, registration: &Registratio
         fps: FPS,
     };
     Rig { sensors: vec![sensor] }
+}
+
+/// Where memory for transfers is used up, also by another program's, the error says how to allow more.
+fn advised(error: TransportError) -> Kinect2Error {
+    match error {
+        TransportError::Failed { ref source, .. } if source.to_string().contains("memory") => {
+            Kinect2Error::Memory(error)
+        }
+        other => other.into(),
+    }
 }
 
 fn host_now_ns() -> i64 {

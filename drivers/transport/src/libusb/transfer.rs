@@ -12,6 +12,7 @@
 use std::{
     collections::BTreeMap,
     ffi::c_void,
+    io,
     ptr::NonNull,
     sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc::Sender},
 };
@@ -28,6 +29,9 @@ use rusb::{
 
 use super::device::Shared;
 use crate::{PacketStatus, Transfer, TransferKind, TransferStatus, transfer::PacketResult};
+
+/// What Linux says where `usbcore.usbfs_memory_mb` is used up.
+const ENOMEM: i32 = 12;
 
 /// The transfers of a device that are in flight.
 #[derive(Default)]
@@ -119,13 +123,15 @@ pub(super) fn submit(shared: &Arc<Shared>, transfer: Transfer, done: Sender<Tran
     match unsafe { libusb_submit_transfer(pointer.as_ptr()) } {
         0 => Ok(()),
         code => {
+            // libusb tells one error for all that the kernel says.
+            let says_no_memory = io::Error::last_os_error().raw_os_error() == Some(ENOMEM);
             shared.flights.remove(number);
             // SAFETY: the submission failed, so no callback will run and both are ours again.
             unsafe {
                 libusb_free_transfer(pointer.as_ptr());
                 drop(Box::from_raw(flight));
             }
-            Err(error_of(code))
+            Err(if says_no_memory { rusb::Error::NoMem } else { error_of(code) })
         }
     }
 }
