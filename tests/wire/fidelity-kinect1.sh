@@ -21,9 +21,8 @@ fi
 # The kernel's own driver for its colour camera: a video node whose pictures are compared with what the model sent.
 gone 02ae
 if load gspca_kinect; then
-    serve wire_kinect1 02ae
-    for _ in $(seq 50); do ls /dev/video* > /run/nodes 2> /dev/null && break; sleep 0.2; done
-    if said_by=$("$bin/examples/wire_kinect1" gspca "$(head -1 /run/nodes)" 10 2>&1); then streamed=yes; else streamed=no; fi
+    serve 02ae 1 "$bin/examples/wire_kinect1" serve
+    if said_by=$("$bin/examples/wire_kinect1" gspca "$(find /dev -name 'video*' | head -1)" 10 2>&1); then streamed=yes; else streamed=no; fi
     verdict gspca_kinect $streamed "$said_by"
     gone 02ae
     load -r gspca_kinect

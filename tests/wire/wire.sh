@@ -10,13 +10,18 @@ here="$PWD/tests/wire"
 rig="$PWD/target/outside/wire"
 frames=${WIRE_FRAMES:-100}
 cycles=${WIRE_CYCLES:-10}
+# The Kinect v2's packets cost an emulated processor 2.5 s a frame.
+kinect2_frames=${WIRE_KINECT2_FRAMES:-100}
+kinect2_cycles=${WIRE_KINECT2_CYCLES:-2}
+examples="$PWD/target/release/examples"
+checks=("WIRE kinect1" "FIDELITY freenect-camtest" "FIDELITY gspca_kinect" "WIRE kinect1 first frame" "WIRE kinect1 unplug"
+    "WIRE kinect2" "WIRE kinect2 unplug" "WIRE stereo" "WIRE realsense-bulk"
+    "WIRE realsense-bulk first frame" "WIRE realsense-isochronous" "FIDELITY pyrealsense2"
+    "WIRE realsense-isochronous first frame" "WIRE realsense unplug")
 
 skip() {
     local check
-    for check in "WIRE kinect1" "WIRE realsense-bulk" "WIRE realsense-isochronous" "FIDELITY freenect-camtest" \
-        "FIDELITY gspca_kinect" "FIDELITY pyrealsense2"; do
-        echo "$check SKIPPED: $1"
-    done
+    for check in "${checks[@]}"; do echo "$check SKIPPED: $1"; done
     exit 0
 }
 
@@ -34,16 +39,16 @@ closure() {
 
 download() {
     mkdir -p "$rig/debs" && cd "$rig/debs"
-    apt-get update -qq > /dev/null 2>&1 || true
+    timeout 120 apt-get update -qq > /dev/null 2>&1 || true
     local kernel
     kernel=$(apt-cache depends linux-image-amd64 2> /dev/null | sed -n 's/.*Depends: \(linux-image-[0-9].*\)/\1/p' | head -1)
     [ -n "$kernel" ] || return 1
-    apt-get download -qq "$kernel" busybox-static kmod qemu-system-x86 qemu-system-common qemu-system-data seabios \
+    timeout 300 apt-get download -qq "$kernel" busybox-static kmod qemu-system-x86 qemu-system-common qemu-system-data seabios \
         > /dev/null 2>&1 || return 1
     local package
     for package in $(closure qemu-system-x86 kmod | grep -E '^(lib|zlib1g$)'); do
         # Names of virtual packages cannot be downloaded; qemu says so if one was needed.
-        apt-get download -qq "$package" > /dev/null 2>&1 || true
+        timeout 60 apt-get download -qq "$package" > /dev/null 2>&1 || true
     done
 }
 
@@ -51,13 +56,13 @@ download() {
 clients() {
     local deb
     if [ ! -x "$rig/root/usr/bin/freenect-camtest" ]; then
-        (cd "$rig/debs" && apt-get download -qq libfreenect-bin libfreenect0.5 libusb-1.0-0 > /dev/null 2>&1) || true
+        (cd "$rig/debs" && timeout 120 apt-get download -qq libfreenect-bin libfreenect0.5 libusb-1.0-0 > /dev/null 2>&1) || true
         for deb in "$rig"/debs/libfreenect*.deb "$rig"/debs/libusb*.deb; do
             [ ! -e "$deb" ] || dpkg -x "$deb" "$rig/root"
         done
     fi
     if [ ! -d "$rig/python/pyrealsense2" ]; then
-        python3 -m pip download --no-deps -q -d "$rig/wheels" pyrealsense2 > /dev/null 2>&1 &&
+        timeout 120 python3 -m pip download --no-deps -q -d "$rig/wheels" pyrealsense2 > /dev/null 2>&1 &&
             python3 -m zipfile -e "$rig"/wheels/pyrealsense2*.whl "$rig/python" > /dev/null 2>&1 || true
     fi
 }
@@ -100,27 +105,65 @@ make_initrd() {
     rm -r "$tree"
 }
 
+# A take from the virtual machine beside what the model sent, compared here, where that takes no time.
+compare() { # name, frames, program and words
+    local name=$1 count=$2 words
+    shift 2
+    [ -e "$rig/out/$name.mcap" ] || return 0
+    if words=$("$@" "$rig/out/$name.mcap" "$count" 2>&1); then
+        echo "WIRE $name PASS $words" >> "$rig/out/result"
+        rm "$rig/out/$name.mcap"
+    else
+        echo "WIRE $name FAIL: $words" >> "$rig/out/result"
+    fi
+}
+
+# The line of each check in their order, and how long it all took; fails where one failed or has none.
+report() {
+    local check failed=0
+    for check in "${checks[@]}"; do
+        [ -z "${WIRE_ONLY:-}" ] || grep -q "^$check \(PASS\|FAIL\|SKIPPED\)" "$rig/out/result" || continue
+        grep "^$check \(PASS\|FAIL\|SKIPPED\)" "$rig/out/result" ||
+            echo "$check FAIL: the virtual machine ended before it; see $rig/out/"
+    done | tee "$rig/out/lines"
+    grep "^WIRE FAIL" "$rig/out/result" || true
+    echo "WIRE took $((SECONDS - start)) s"
+    ! grep -q FAIL "$rig/out/lines" "$rig/out/result"
+}
+
 boot() {
+    local kinect2="wire_kinect2=$kinect2_frames wire_kinect2_cycles=$kinect2_cycles"
     rm -rf "$rig/out" && mkdir -p "$rig/out"
-    unpacked timeout "${WIRE_SECONDS:-1500}" "$rig/root/usr/bin/qemu-system-x86_64" -L "$rig/root/usr/share/qemu" \
-        -L "$rig/root/usr/share/seabios" -M q35 -accel tcg,thread=multi -cpu max,la57=off -smp 2 -m 3072 -nodefaults \
+    # Before other work, where that may be asked for: limits of time hold for what others leave of the processors. A
+    # session has a share of its own (autogroup of Linux' sched(7)), within which alone `nice` counts.
+    unpacked timeout "${WIRE_SECONDS:-1500}" setsid --wait bash -c \
+        'echo -10 2> /dev/null > /proc/self/autogroup; exec nice -n -10 "$@"' session "$rig/root/usr/bin/qemu-system-x86_64" -L "$rig/root/usr/share/qemu" \
+        -L "$rig/root/usr/share/seabios" -M q35 -accel tcg,thread=multi -cpu max,la57=off,-erms,-fsrm -smp 2 -m 3072 -nodefaults \
         -no-user-config -display none -no-reboot -serial "file:$rig/out/console" -monitor none \
         -kernel "$rig/kern/boot/vmlinuz-$release" -initrd "$rig/initrd.img" \
-        -append "console=ttyS0 panic=-1 quiet mitigations=off nokaslr tsc=reliable no_timer_check wire_frames=$frames wire_cycles=$cycles" \
+        -append "console=ttyS0 panic=-1 quiet mitigations=off nokaslr tsc=reliable no_timer_check usbcore.usbfs_memory_mb=64 wire_frames=$frames wire_cycles=$cycles wire_only=${WIRE_ONLY:-} $kinect2" \
         -fsdev local,id=host,path=/,security_model=none,readonly=on,multidevs=remap \
         -device virtio-9p-pci,fsdev=host,mount_tag=host \
         -fsdev "local,id=out,path=$rig/out,security_model=none" -device virtio-9p-pci,fsdev=out,mount_tag=out || true
 }
 
 bash scripts/cargo.sh build --release --locked --package toile-studio --quiet
-bash scripts/cargo.sh build --release --locked --package toile-driver-kinect1 --example wire_kinect1 --quiet
-bash scripts/cargo.sh build --release --locked --package toile-driver-realsense --example wire_realsense --quiet
+words=()
+for driver in kinect1 kinect2 realsense stereo; do words+=(--package toile-driver-$driver --example wire_$driver); done
+bash scripts/cargo.sh build --release --locked --quiet "${words[@]}"
 ls "$rig"/debs/linux-image*.deb "$rig"/debs/qemu-system-x86_*.deb > /dev/null 2>&1 || (download) ||
     skip "Debian's kernel and qemu cannot be downloaded (no network?)"
 release=$(basename "$(ls "$rig"/debs/linux-image-*.deb | tail -1)" | sed 's/^linux-image-\([^_]*\)_.*/\1/')
 [ -e "$rig/kern/lib/modules/$release/modules.dep" ] || unpack
 clients
 make_initrd
+"$examples/wire_kinect2" write "$rig/kinect2-images"
+"$examples/wire_stereo" write "$rig/stereo"
+start=$SECONDS
 boot
-grep -hE '^(WIRE|FIDELITY)' "$rig/out/result" 2> /dev/null || echo "WIRE FAIL: the virtual machine ended early; see $rig/out/"
-! grep -q FAIL "$rig/out/result" && [ -s "$rig/out/result" ]
+compare kinect1 "$frames" "$examples/wire_kinect1" check
+compare kinect2 "$kinect2_frames" "$examples/wire_kinect2" check "$rig/kinect2-images"
+compare stereo 20 "$examples/wire_stereo" check "$rig/stereo"
+compare realsense-bulk "$frames" "$examples/wire_realsense" check
+compare realsense-isochronous "$frames" "$examples/wire_realsense" check
+report

@@ -1,35 +1,32 @@
-//! The wire tier's two ends for the Kinect v1, run inside the virtual machine (see `tests/wire/`).
+//! The wire tier's two ends for the Kinect v1 (see `tests/wire/`); within the virtual machine where not said otherwise.
 //!
 //! `wire_kinect1 serve`: plugs the model into the kernel's virtual host controller and serves it until killed;
-//! `wire_kinect1 check FILE COUNT`: compares the first COUNT frames of a take with what the model sent, pixel by pixel;
+//! `wire_kinect1 check FILE COUNT` (anywhere): compares the first COUNT frames of a take with what the model sent;
 //! `wire_kinect1 gspca NODE COUNT`: compares COUNT pictures that the kernel's own driver gives with what the model sent;
+//! `wire_kinect1 first`: milliseconds from opening to the first frame;
 //! `wire_kinect1 cycles COUNT`: unplugs and replugs the model, each time with frames read through libusb.
 #![allow(clippy::print_stdout)]
 
 use std::{
     error::Error,
-    fs,
+    io,
     path::Path,
     sync::{Arc, Mutex},
-    thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
-use toile_capture::{ColorImage, Frame, Replay, Source};
+use toile_capture::{ColorImage, Frame, Source};
 use toile_driver_kinect1::{Kinect1, Settings};
 use toile_driver_models::{
     kinect1::{CameraModel, Content, Pattern},
+    proof::{self, Bench, difference},
     vhci::{self, Plugged},
 };
 use toile_driver_transport::{
-    Bus, TransportError,
+    Bus,
     libusb::LibusbBus,
     video::{FourCc, Video, kernel::KernelVideo},
-    wait_for,
 };
-
-/// Port of the kernel's virtual host controller.
-const PORT: u32 = 0;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -42,39 +39,77 @@ fn main() -> Outcome<()> {
             if let Err(error) = plug()?.wait() {
                 println!("server: {error}");
             }
-            Ok(())
         }
-        ["check", file, count] => check(Path::new(file), count.parse()?),
-        ["gspca", node, count] => gspca(Path::new(node), count.parse()?),
-        ["cycles", count] => cycles(count.parse()?),
-        _ => Err("serve | check FILE COUNT | gspca NODE COUNT | cycles COUNT".into()),
+        ["check", file, count] => {
+            let table = millimetres();
+            println!("{}", proof::take(Path::new(file), count.parse()?, |frame| differs(frame, &table))?);
+        }
+        ["gspca", node, count] => gspca(Path::new(node), count.parse()?)?,
+        ["first"] => println!("{}", proof::first_frame(&mut Wire::new()?)?),
+        ["cycles", count] => println!("{}", proof::cycles(&mut Wire::new()?, count.parse()?)?),
+        _ => return Err("serve | check FILE COUNT | gspca NODE COUNT | first | cycles COUNT".into()),
+    }
+    Ok(())
+}
+
+fn plug() -> io::Result<Plugged> {
+    vhci::plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()))))
+}
+
+struct Wire {
+    bus: LibusbBus,
+    mm_from_raw: Vec<u16>,
+}
+
+impl Wire {
+    fn new() -> Outcome<Self> {
+        Ok(Self { bus: LibusbBus::new()?, mm_from_raw: millimetres() })
     }
 }
 
-fn plug() -> Outcome<Plugged> {
-    Ok(vhci::plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()))), PORT)?)
+impl Bench for Wire {
+    fn plug(&mut self) -> io::Result<Plugged> {
+        plug()
+    }
+
+    /// The device's node appears a moment after the device.
+    fn is_there(&self) -> bool {
+        let listed = self.bus.list().unwrap_or_default();
+        listed.iter().any(|info| info.product == 0x02ae && self.bus.open(info).is_ok())
+    }
+
+    fn is_gone(&self) -> bool {
+        self.bus.list().is_ok_and(|listed| listed.iter().all(|info| info.product != 0x02ae))
+    }
+
+    fn open(&mut self) -> Result<Box<dyn Source>, String> {
+        let limit = Duration::from_secs(20);
+        let settings = Settings { frame_limit: limit, command_limit: limit, ..Settings::default() };
+        Ok(Box::new(Kinect1::open(&self.bus, None, settings).map_err(|error| error.to_string())?))
+    }
+
+    fn difference(&mut self, frame: &Frame) -> Option<String> {
+        differs(frame, &self.mm_from_raw)
+    }
 }
 
-/// True where every pixel of a frame is what the model sent.
-fn is_identical(frame: &Frame, mm_from_raw: &[u16]) -> bool {
-    let number = first_number(frame);
-    let truth: Vec<u16> = Pattern::default().depth(number).iter().map(|raw| mm_from_raw[usize::from(*raw)]).collect();
-    let depth = frame.depth.as_ref().is_none_or(|depth| depth.values == truth);
+/// How a frame differs from what the model sent at its time.
+fn differs(frame: &Frame, mm_from_raw: &[u16]) -> Option<String> {
+    // The model's number of a frame, by its time: 30 a second.
+    let number = (frame.device_time_ns as f64 * 30e-9).round() as u64;
+    let depth = frame.depth.as_ref().and_then(|depth| {
+        let sent = Pattern::default().depth(number);
+        let sent: Vec<u16> = sent.iter().map(|raw| mm_from_raw[usize::from(*raw)]).collect();
+        difference("depth", &depth.values, &sent)
+    });
     let filter = |i: usize| [[1, 0], [2, 1]][i / 640 % 2][i % 2];
-    let color = match &frame.color {
-        Some(ColorImage::Rgb(image)) => {
+    depth.or_else(|| match frame.color.as_ref()? {
+        ColorImage::Rgb(image) => {
             let seen: Vec<u8> = image.pixels.iter().enumerate().map(|(i, p)| p[filter(i)]).collect();
-            seen == Pattern::default().bayer(number)
+            difference("colour", &seen, &Pattern::default().bayer(number))
         }
-        Some(_) => false,
-        None => true,
-    };
-    depth && color
-}
-
-/// The model's number of a frame, by its time: 30 a second.
-fn first_number(frame: &Frame) -> u64 {
-    (frame.device_time_ns as f64 * 30e-9).round() as u64
+        _ => Some("colour has no pixels".into()),
+    })
 }
 
 /// Millimetres of every raw value by the model's optics: z = 10·r·e / (e − m).
@@ -84,22 +119,6 @@ fn millimetres() -> Vec<u16> {
         (10.0 * 120.0 * 7.5 / (7.5 - m)).round() as u16
     };
     (0..2048).map(|raw| if raw == 2047 { 0 } else { mm(raw) }).collect()
-}
-
-fn check(file: &Path, count: u64) -> Outcome<()> {
-    let (replay, table) = (Replay::open(file)?, millimetres());
-    let found = replay.len().min(count);
-    let mut identical = 0;
-    let (mut lost, mut unpaired) = (0, 0);
-    for index in 0..found {
-        let frame = replay.frame(index)?;
-        identical += u64::from(is_identical(&frame, &table));
-        lost += u64::from(frame.lost_before);
-        unpaired += u64::from(frame.depth.is_none() || frame.color.is_none());
-    }
-    let verdict = if identical == count { "PASS" } else { "FAIL" };
-    println!("WIRE kinect1 {verdict} {identical}/{count} (lost {lost}, unpaired {unpaired})");
-    if identical == count { Ok(()) } else { Err("not every frame is what the model sent".into()) }
 }
 
 /// The kernel's driver (`drivers/media/usb/gspca/kinect.c`) gives colour behind the Bayer filter, as it was sent.
@@ -121,56 +140,4 @@ fn gspca(node: &Path, count: u64) -> Outcome<()> {
     }
     println!("{} of {count} pictures {format} {}x{} identical", count - torn, layout.width, layout.height);
     if torn <= 1 { Ok(()) } else { Err(format!("{torn} pictures are not what the model sent").into()) }
-}
-
-fn cycles(count: u32) -> Outcome<()> {
-    let bus = Arc::new(LibusbBus::new()?);
-    let table = millimetres();
-    let fds = || fs::read_dir("/proc/self/fd").map_or(0, Iterator::count);
-    let mut before = 0;
-    for cycle in 0..count {
-        let plugged = plug()?;
-        wait_for(&*bus, |info| info.product == 0x02ae, Duration::from_secs(30))?;
-        // The node appears a moment after the device.
-        let start = Instant::now();
-        let mut kinect = loop {
-            match Kinect1::open(&*bus, None, Settings { frame_limit: Duration::from_secs(20), ..Settings::default() }) {
-                Ok(kinect) => break kinect,
-                Err(error) if start.elapsed() > Duration::from_secs(20) => return Err(error.into()),
-                Err(_) => thread::sleep(Duration::from_millis(200)),
-            }
-        };
-        for _ in 0..2 {
-            let frame = kinect.next_frame()?.ok_or("the stream ended")?;
-            if !is_identical(&frame, &table) {
-                return Err("a frame is not what the model sent".into());
-            }
-        }
-        plugged.unplug()?;
-        let ended = loop {
-            match kinect.next_frame() {
-                Ok(Some(_)) => {}
-                Ok(None) => return Err("the stream ended without saying why".into()),
-                Err(error) => break error.to_string(),
-            }
-        };
-        if !ended.contains("unplugged") {
-            return Err(ended.into());
-        }
-        drop(kinect);
-        let start = Instant::now();
-        while bus.list()?.iter().any(|info| info.product == 0x02ae) {
-            if start.elapsed() > Duration::from_secs(20) {
-                return Err(TransportError::TimedOut { what: "unplugging".into(), waited: start.elapsed() }.into());
-            }
-            thread::sleep(Duration::from_millis(50));
-        }
-        match cycle {
-            0 => before = fds(),
-            _ if fds() > before => return Err(format!("{} open files, {before} at first", fds()).into()),
-            _ => {}
-        }
-    }
-    println!("WIRE kinect1 unplug PASS {count}/{count}");
-    Ok(())
 }

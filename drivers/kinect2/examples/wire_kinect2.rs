@@ -1,36 +1,33 @@
-//! The wire tier's two ends for the Kinect v2, run inside the virtual machine (see `tests/wire/`).
+//! The wire tier's two ends for the Kinect v2 (see `tests/wire/`); within the virtual machine where not said otherwise.
 //!
-//! `wire_kinect2 serve`: plugs the model into the kernel's virtual host controller, on a USB 3 port, and serves it until
-//! killed; `wire_kinect2 check FILE COUNT`: compares the first COUNT frames of a take with what the model sent, pixel by
-//! pixel; `wire_kinect2 cycles COUNT`: unplugs and replugs the model, each time with frames read through libusb.
+//! `wire_kinect2 write FILE` (before the boot): what the model is to send, and what must arrive, which an emulated
+//! processor would compute for minutes;
+//! `wire_kinect2 serve FILE`: plugs the model into the kernel's virtual host controller, on a USB 3 port, and serves it
+//! until killed;
+//! `wire_kinect2 check FILE TAKE COUNT` (anywhere): compares the first COUNT frames of a take with what must arrive;
+//! `wire_kinect2 first FILE`: milliseconds from opening to the first frame;
+//! `wire_kinect2 cycles FILE COUNT`: unplugs and replugs the model, each time with frames read through libusb.
 #![allow(clippy::print_stdout)]
 
 use std::{
-    collections::BTreeMap,
     error::Error,
-    fs,
-    os::{fd::AsRawFd, unix::net::UnixStream},
+    fs, io,
     path::Path,
     sync::{Arc, Mutex},
-    thread::{self, JoinHandle},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
-use toile_capture::{ColorImage, Frame, Replay, RgbImage, Source};
+use toile_capture::{ColorImage, Frame, Source};
 use toile_driver_kinect2::{
     Calibration, DecodeSettings, Decoder, Kinect2, Settings, color, registration::Registration,
 };
 use toile_driver_models::{
-    kinect2::{CameraModel, Content, Pattern},
-    usbip,
+    kinect2::{CameraModel, Content, Optics, Pattern},
+    proof::{self, Bench, difference},
+    vhci::{self, Plugged},
 };
-use toile_driver_transport::{Bus, libusb::LibusbBus, wait_for};
+use toile_driver_transport::{Bus, libusb::LibusbBus};
 
-/// The kernel's virtual host controller.
-const CONTROLLER: &str = "/sys/devices/platform/vhci_hcd.0";
-/// A device id of our choice, and super speed (Linux `include/uapi/linux/usb/ch9.h`).
-const DEVICE: u32 = 0x1_0003;
-const SUPER_SPEED: u32 = 5;
 /// The model's product id.
 const PRODUCT: u16 = 0x02c4;
 
@@ -40,164 +37,136 @@ fn main() -> Outcome<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
-        ["serve"] => {
-            let served = plug(&Pattern::default())?.thread.join();
-            served.map_err(|_| "the server panicked")?;
-            Ok(())
+        ["write", file] => write(Path::new(file))?,
+        ["serve", file] => {
+            // The kernel lets go when it is told to; what was being written then is of no use to it.
+            if let Err(error) = Images::read(file)?.plug()?.wait() {
+                println!("server: {error}");
+            }
         }
-        ["check", file, count] => check(Path::new(file), count.parse()?),
-        ["cycles", count] => cycles(count.parse()?),
-        _ => Err("serve | check FILE COUNT | cycles COUNT".into()),
+        ["check", file, take, count] => {
+            let images = Images::read(file)?;
+            println!("{}", proof::take(Path::new(take), count.parse()?, |frame| images.difference(frame))?);
+        }
+        ["first", file] => println!("{}", proof::first_frame(&mut Wire::new(file)?)?),
+        ["cycles", file, count] => println!("{}", proof::cycles(&mut Wire::new(file)?, count.parse()?)?),
+        _ => return Err("write FILE | serve FILE | check FILE TAKE COUNT | first FILE | cycles FILE COUNT".into()),
     }
-}
-
-/// A model that the kernel sees.
-struct Plugged {
-    line: UnixStream,
-    thread: JoinHandle<()>,
-}
-
-fn plug(pattern: &Pattern) -> Outcome<Plugged> {
-    // Made before anybody waits for them.
-    let mut pattern = pattern.clone();
-    (0..Pattern::FRAMES).for_each(|frame| drop((pattern.depth(frame), pattern.jpeg(frame))));
-    let (kernel, ours) = UnixStream::pair()?;
-    let port = free_port()?;
-    let about = format!("{port} {} {DEVICE} {SUPER_SPEED}", kernel.as_raw_fd());
-    fs::write(format!("{CONTROLLER}/attach"), about)?;
-    let mut line = ours.try_clone()?;
-    let thread = thread::spawn(move || {
-        let model = Mutex::new(CameraModel::new(pattern));
-        if let Err(error) = usbip::serve(&model, &mut line) {
-            println!("server: {error}");
-        }
-    });
-    Ok(Plugged { line: ours, thread })
-}
-
-/// The first USB 3 port of the controller that is free: "ss 0015 004 ...".
-fn free_port() -> Outcome<u32> {
-    let status = fs::read_to_string(format!("{CONTROLLER}/status"))?;
-    let ports = status.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
-    let free =
-        ports.filter(|words| words.len() > 2 && words[0] == "ss" && words[2] == "004").find_map(|w| w[1].parse().ok());
-    Ok(free.ok_or("the virtual host controller has no free USB 3 port")?)
-}
-
-fn unplug(plugged: Plugged) -> Outcome<()> {
-    plugged.line.shutdown(std::net::Shutdown::Both)?;
-    plugged.thread.join().map_err(|_| "the server panicked")?;
     Ok(())
 }
 
-/// What each frame of the pattern must give: depth in millimetres and the registered colours.
-struct Truth(BTreeMap<u64, (Vec<u16>, RgbImage)>);
+/// What the model sends and what must arrive, frame by frame: depth packet, JPEG, millimetres, registered colours. Of the
+/// pattern's, which come again and again.
+#[derive(Clone)]
+struct Images(Vec<[Arc<Vec<u8>>; 4]>);
 
-impl Truth {
-    fn new(pattern: &Pattern) -> Outcome<Self> {
-        let mut pattern = pattern.clone();
-        let [depth, color, p0] = pattern.optics().answers();
-        let calibration = Calibration::parse(&depth, &color, &p0)?;
-        let mut decoder = Decoder::new(&calibration, DecodeSettings::default());
-        let registration = Registration::new(&calibration);
-        let mut frames = BTreeMap::new();
-        for frame in 0..Pattern::FRAMES {
-            let decoded = decoder.decode(&pattern.depth(frame))?;
-            let colors = registration.register(&decoded.depth_mm, &color::decode(&pattern.jpeg(frame))?);
-            let mm = decoded.depth_mm.iter().map(|mm| (mm + 0.5) as u16).collect();
-            frames.insert(frame, (mm, colors));
+/// Each part of the file stands behind its length.
+fn write(file: &Path) -> Outcome<()> {
+    let mut pattern = Pattern::default();
+    let [depth, color, p0] = pattern.optics().answers();
+    let calibration = Calibration::parse(&depth, &color, &p0)?;
+    let mut decoder = Decoder::new(&calibration, DecodeSettings::default());
+    let registration = Registration::new(&calibration);
+    let mut bytes = Vec::new();
+    for frame in 0..Pattern::FRAMES {
+        let (packet, jpeg) = (pattern.depth(frame), pattern.jpeg(frame));
+        let depth_mm = decoder.decode(&packet)?.depth_mm;
+        let colors = registration.register(&depth_mm, &color::decode(&jpeg)?);
+        let mm: Vec<u8> = depth_mm.iter().flat_map(|mm| ((mm + 0.5) as u16).to_le_bytes()).collect();
+        for part in [&packet[..], &jpeg[..], &mm[..], colors.pixels.as_flattened()] {
+            bytes.extend(u32::try_from(part.len())?.to_le_bytes());
+            bytes.extend(part);
+        }
+    }
+    Ok(fs::write(file, bytes)?)
+}
+
+impl Images {
+    fn read(file: &str) -> Outcome<Self> {
+        let bytes = fs::read(file)?;
+        let (mut rest, mut parts) = (&bytes[..], Vec::new());
+        while let Some((length, after)) = rest.split_first_chunk() {
+            let cut = after.split_at_checked(u32::from_le_bytes(*length) as usize);
+            let (part, after) = cut.ok_or("the file of images is cut short")?;
+            parts.push(Arc::new(part.to_vec()));
+            rest = after;
+        }
+        let frames: Vec<[_; 4]> = parts.as_chunks().0.to_vec();
+        if frames.len() as u64 != Pattern::FRAMES {
+            return Err("the file of images is of another version: write it again".into());
         }
         Ok(Self(frames))
     }
 
-    /// True where every pixel of a frame is what the model sent.
-    fn is(&self, frame: &Frame) -> bool {
+    fn frame(&self, number: u64) -> &[Arc<Vec<u8>>; 4] {
+        &self.0[(number % Pattern::FRAMES) as usize]
+    }
+
+    fn plug(&self) -> io::Result<Plugged> {
+        vhci::plug(Arc::new(Mutex::new(CameraModel::new(self.clone()))))
+    }
+
+    /// How a frame differs from what must arrive at its time.
+    fn difference(&self, frame: &Frame) -> Option<String> {
         // The model's number of a frame, by its time: 30 a second.
-        let number = (frame.device_time_ns as f64 * 30e-9).round() as u64 % Pattern::FRAMES;
-        let Some((mm, colors)) = self.0.get(&number) else { return false };
-        let depth = frame.depth.as_ref().is_none_or(|depth| depth.values == *mm);
-        // Colour that came alone is not registered by this depth.
-        depth && (frame.depth.is_none() || is_color(&frame.color, colors))
+        let [_, _, mm, colors] = self.frame((frame.device_time_ns as f64 * 30e-9).round() as u64);
+        let sent: Vec<u16> = mm.as_chunks().0.iter().map(|b| u16::from_le_bytes(*b)).collect();
+        // Colour that came alone cannot be registered by this depth.
+        let depth = frame.depth.as_ref()?;
+        difference("depth", &depth.values, &sent).or_else(|| match frame.color.as_ref()? {
+            ColorImage::Rgb(image) => difference("colour", image.pixels.as_flattened(), colors),
+            _ => Some("colour has no pixels".into()),
+        })
     }
 }
 
-fn is_color(color: &Option<ColorImage>, truth: &RgbImage) -> bool {
-    match color {
-        Some(ColorImage::Rgb(image)) => **image == *truth,
-        Some(_) => false,
-        None => true,
+impl Content for Images {
+    fn depth(&mut self, frame: u64) -> Arc<Vec<u8>> {
+        self.frame(frame)[0].clone()
+    }
+
+    fn jpeg(&mut self, frame: u64) -> Arc<Vec<u8>> {
+        self.frame(frame)[1].clone()
+    }
+
+    fn optics(&self) -> Optics {
+        Optics::default()
     }
 }
 
-fn check(file: &Path, count: u64) -> Outcome<()> {
-    let (replay, truth) = (Replay::open(file)?, Truth::new(&Pattern::default())?);
-    let found = replay.len().min(count);
-    let (mut identical, mut lost, mut unpaired) = (0, 0, 0);
-    for index in 0..found {
-        let frame = replay.frame(index)?;
-        identical += u64::from(truth.is(&frame));
-        lost += u64::from(frame.lost_before);
-        unpaired += u64::from(frame.depth.is_none() || frame.color.is_none());
-    }
-    let verdict = if identical == count { "PASS" } else { "FAIL" };
-    println!("WIRE kinect2 {verdict} {identical}/{count} (lost {lost}, unpaired {unpaired})");
-    if identical == count { Ok(()) } else { Err("not every frame is what the model sent".into()) }
+struct Wire {
+    bus: LibusbBus,
+    images: Images,
 }
 
-fn cycles(count: u32) -> Outcome<()> {
-    let bus = Arc::new(LibusbBus::new()?);
-    let pattern = Pattern::default();
-    let truth = Truth::new(&pattern)?;
-    let fds = || fs::read_dir("/proc/self/fd").map_or(0, Iterator::count);
-    let mut before = 0;
-    for cycle in 0..count {
-        let plugged = plug(&pattern)?;
-        wait_for(&*bus, |info| info.product == PRODUCT, Duration::from_secs(30))?;
-        let mut kinect = open(&bus)?;
-        for _ in 0..2 {
-            if !truth.is(&kinect.next_frame()?.ok_or("the stream ended")?) {
-                return Err("a frame is not what the model sent".into());
-            }
-        }
-        unplug(plugged)?;
-        let ended = loop {
-            match kinect.next_frame() {
-                Ok(Some(_)) => {}
-                Ok(None) => return Err("the stream ended without saying why".into()),
-                Err(error) => break error.to_string(),
-            }
-        };
-        if !ended.contains("unplugged") {
-            return Err(ended.into());
-        }
-        drop(kinect);
-        let start = Instant::now();
-        while bus.list()?.iter().any(|info| info.product == PRODUCT) {
-            if start.elapsed() > Duration::from_secs(20) {
-                return Err("the device stays on the bus after its unplugging".into());
-            }
-            thread::sleep(Duration::from_millis(50));
-        }
-        match cycle {
-            0 => before = fds(),
-            _ if fds() > before => return Err(format!("{} open files, {before} at first", fds()).into()),
-            _ => {}
-        }
+impl Wire {
+    fn new(file: &str) -> Outcome<Self> {
+        Ok(Self { bus: LibusbBus::new()?, images: Images::read(file)? })
     }
-    println!("WIRE kinect2 unplug PASS {count}/{count}");
-    Ok(())
 }
 
-/// The node appears a moment after the device.
-fn open(bus: &LibusbBus) -> Outcome<Kinect2> {
-    let start = Instant::now();
-    let limits = Duration::from_secs(20);
-    let settings = Settings { frame_limit: limits, command_limit: limits, ..Settings::default() };
-    loop {
-        match Kinect2::open(bus, None, settings.clone()) {
-            Ok(kinect) => return Ok(kinect),
-            Err(error) if start.elapsed() > limits => return Err(error.into()),
-            Err(_) => thread::sleep(Duration::from_millis(200)),
-        }
+impl Bench for Wire {
+    fn plug(&mut self) -> io::Result<Plugged> {
+        self.images.plug()
+    }
+
+    /// The device's node appears a moment after the device.
+    fn is_there(&self) -> bool {
+        let listed = self.bus.list().unwrap_or_default();
+        listed.iter().any(|info| info.product == PRODUCT && self.bus.open(info).is_ok())
+    }
+
+    fn is_gone(&self) -> bool {
+        self.bus.list().is_ok_and(|listed| listed.iter().all(|info| info.product != PRODUCT))
+    }
+
+    fn open(&mut self) -> Result<Box<dyn Source>, String> {
+        let limit = Duration::from_secs(20);
+        let settings = Settings { frame_limit: limit, command_limit: limit, ready_limit: limit, ..Settings::default() };
+        Ok(Box::new(Kinect2::open(&self.bus, None, settings).map_err(|error| error.to_string())?))
+    }
+
+    fn difference(&mut self, frame: &Frame) -> Option<String> {
+        self.images.difference(frame)
     }
 }

@@ -8,7 +8,8 @@
 //! - [`kinect2`]: the second Kinect;
 //! - [`d435`]: the RealSense D435: depth, infrared pair, colour, its monitor and its calibration;
 //! - [`uvc`]: UVC cameras of any shape; [`side_by_side`]: a stereo camera among them;
-//! - [`descriptors`]: standard requests, for kernels; [`usbip`]: a model behind USB/IP; [`vhci`]: plugged into a kernel.
+//! - [`descriptors`]: standard requests, for kernels; [`usbip`]: a model behind USB/IP; [`vhci`]: plugged into a kernel;
+//!   [`proof`]: what is proven there.
 //!
 //! ```
 //! use std::sync::{Arc, Mutex};
@@ -23,6 +24,7 @@ pub mod d435;
 pub mod descriptors;
 pub mod kinect1;
 pub mod kinect2;
+pub mod proof;
 pub mod side_by_side;
 pub mod usbip;
 pub mod uvc;

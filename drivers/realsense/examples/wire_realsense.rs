@@ -1,24 +1,25 @@
-//! The wire tier's two ends for the RealSense D435, run inside the virtual machine (see `tests/wire/`).
+//! The wire tier's two ends for the RealSense D435 (see `tests/wire/`); within the virtual machine where not said
+//! otherwise.
 //!
 //! `wire_realsense serve bulk|isochronous`: plugs the model into the kernel's virtual host controller and serves it
 //! until killed;
-//! `wire_realsense check NAME FILE COUNT`: compares the first COUNT frames of a take with what the model sent;
+//! `wire_realsense check FILE COUNT` (anywhere): compares the first COUNT frames of a take with what the model sent;
 //! `wire_realsense first bulk|isochronous`: milliseconds from opening to the first frame;
 //! `wire_realsense cycles COUNT`: unplugs and replugs the model, each time with frames read through the kernel.
 #![allow(clippy::print_stdout)]
 
 use std::{
     error::Error,
-    fs,
+    io,
     path::Path,
     sync::{Arc, Mutex},
-    thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
-use toile_capture::{ColorImage, Frame, Replay, Source};
+use toile_capture::{ColorImage, Frame, Source};
 use toile_driver_models::{
     d435::{self, Content, Pattern},
+    proof::{self, Bench, difference},
     uvc::Wire,
     vhci::{self, Plugged},
 };
@@ -26,8 +27,6 @@ use toile_driver_realsense::{Realsense, Settings, list};
 use toile_driver_transport::video::kernel::KernelVideo;
 
 const SIZE: (u16, u16) = (640, 480);
-/// Port of the controller: beside the Kinect's.
-const PORT: u32 = 1;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -40,13 +39,15 @@ fn main() -> Outcome<()> {
             if let Err(error) = plug(wire(name)?)?.wait() {
                 println!("server: {error}");
             }
-            Ok(())
         }
-        ["check", name, file, count] => check(name, Path::new(file), count.parse()?),
-        ["first", name] => first(name),
-        ["cycles", count] => cycles(count.parse()?),
-        _ => Err("serve bulk|isochronous | check NAME FILE COUNT | first bulk|isochronous | cycles COUNT".into()),
+        ["check", file, count] => println!("{}", proof::take(Path::new(file), count.parse()?, differs)?),
+        ["first", name] => println!("{}", proof::first_frame(&mut Kernel::new(&[wire(name)?]))?),
+        ["cycles", count] => {
+            println!("{}", proof::cycles(&mut Kernel::new(&[Wire::Bulk, Wire::Isochronous]), count.parse()?)?)
+        }
+        _ => return Err("serve bulk|isochronous | check FILE COUNT | first bulk|isochronous | cycles COUNT".into()),
     }
+    Ok(())
 }
 
 fn wire(name: &str) -> Outcome<Wire> {
@@ -57,21 +58,56 @@ fn wire(name: &str) -> Outcome<Wire> {
     }
 }
 
-fn plug(wire: Wire) -> Outcome<Plugged> {
-    let model = d435::model(Pattern::default(), wire);
-    Ok(vhci::plug(Arc::new(Mutex::new(model)), PORT)?)
+fn plug(wire: Wire) -> io::Result<Plugged> {
+    vhci::plug(Arc::new(Mutex::new(d435::model(Pattern::default(), wire))))
 }
 
-/// True where every pixel of a frame is what the model sent: colours by ITU-R BT.601, within one step of rounding.
-fn is_identical(frame: &Frame) -> bool {
+/// The model behind `uvcvideo`, by each of its wires in turn.
+struct Kernel {
+    video: KernelVideo,
+    wires: Vec<Wire>,
+}
+
+impl Kernel {
+    fn new(wires: &[Wire]) -> Self {
+        Self { video: KernelVideo::default(), wires: wires.into() }
+    }
+}
+
+impl Bench for Kernel {
+    fn plug(&mut self) -> io::Result<Plugged> {
+        self.wires.rotate_left(1);
+        plug(self.wires[self.wires.len() - 1])
+    }
+
+    fn is_there(&self) -> bool {
+        let found = list(&self.video).unwrap_or_default();
+        found.first().is_some_and(|c| c.depth.is_some() && c.color.is_some())
+    }
+
+    fn is_gone(&self) -> bool {
+        list(&self.video).is_ok_and(|found| found.is_empty())
+    }
+
+    fn open(&mut self) -> Result<Box<dyn Source>, String> {
+        let settings = Settings { frame_limit: Duration::from_secs(30), ..Settings::default() };
+        Ok(Box::new(Realsense::open(&self.video, None, settings).map_err(|error| error.to_string())?))
+    }
+
+    fn difference(&mut self, frame: &Frame) -> Option<String> {
+        differs(frame)
+    }
+}
+
+/// How a frame differs from what the model sent at its time: colours by ITU-R BT.601, within one step of rounding.
+fn differs(frame: &Frame) -> Option<String> {
     let number = (frame.device_time_ns as f64 * 30e-9).round() as u64;
-    let depth = frame.depth.as_ref().is_none_or(|depth| depth.values == Pattern::default().depth(number, SIZE));
-    let color = match &frame.color {
-        Some(ColorImage::Rgb(image)) => is_color(&image.pixels, &Pattern::default().yuyv(number, SIZE)),
-        Some(_) => false,
-        None => true,
-    };
-    depth && color
+    let depth = frame.depth.as_ref();
+    let depth = depth.and_then(|d| difference("depth", &d.values, &Pattern::default().depth(number, SIZE)));
+    depth.or_else(|| match frame.color.as_ref()? {
+        ColorImage::Rgb(image) if is_color(&image.pixels, &Pattern::default().yuyv(number, SIZE)) => None,
+        _ => Some("colour is not what was sent".into()),
+    })
 }
 
 fn is_color(pixels: &[[u8; 3]], bytes: &[u8]) -> bool {
@@ -84,96 +120,4 @@ fn is_color(pixels: &[[u8; 3]], bytes: &[u8]) -> bool {
             let truth = [y + 1.596_027 * v, y - 0.391_762 * u - 0.812_968 * v, y + 2.017_232 * u];
             pixel.iter().zip(truth).all(|(seen, truth)| near(*seen, truth))
         })
-}
-
-fn check(name: &str, file: &Path, count: u64) -> Outcome<()> {
-    let replay = Replay::open(file)?;
-    let found = replay.len().min(count);
-    let (mut identical, mut lost, mut unpaired, mut numbers) = (0, 0, 0, None);
-    for index in 0..found {
-        let frame = replay.frame(index)?;
-        identical += u64::from(is_identical(&frame));
-        lost += u64::from(frame.lost_before);
-        unpaired += u64::from(frame.depth.is_none() || frame.color.is_none());
-        let first = numbers.map_or(frame.device_frame, |(first, _)| first);
-        numbers = Some((first, frame.device_frame));
-    }
-    let (first, last) = numbers.unwrap_or((1, 0));
-    let all_counted = (last + 1).wrapping_sub(first) == found + lost;
-    let passed = identical == count && all_counted;
-    let verdict = if passed { "PASS" } else { "FAIL" };
-    println!("WIRE {name} {verdict} {identical}/{count} (lost {lost}, unpaired {unpaired})");
-    if passed { Ok(()) } else { Err("not every frame is what the model sent, or a loss was not counted".into()) }
-}
-
-/// Waits for the camera's nodes, or until they are gone.
-fn wait(is_there: bool) -> Outcome<KernelVideo> {
-    let (video, start) = (KernelVideo::default(), Instant::now());
-    loop {
-        let found = list(&video)?;
-        let is_complete = found.first().is_some_and(|c| c.depth.is_some() && c.color.is_some());
-        if is_complete == is_there && (is_there || found.is_empty()) {
-            return Ok(video);
-        }
-        if start.elapsed() > Duration::from_secs(60) {
-            return Err(format!("waiting for nodes (there: {is_there}): {found:?}").into());
-        }
-        thread::sleep(Duration::from_millis(200));
-    }
-}
-
-fn settings() -> Settings {
-    Settings { frame_limit: Duration::from_secs(30), ..Settings::default() }
-}
-
-fn first(name: &str) -> Outcome<()> {
-    let plugged = plug(wire(name)?)?;
-    let video = wait(true)?;
-    let start = Instant::now();
-    let mut camera = Realsense::open(&video, None, settings())?;
-    let opened = start.elapsed().as_millis();
-    let frame = camera.next_frame()?.ok_or("the stream ended")?;
-    let all = start.elapsed().as_millis();
-    let verdict = if is_identical(&frame) { "PASS" } else { "FAIL" };
-    println!("WIRE realsense-{name} first frame {verdict} {all} ms of guest time (opened after {opened} ms)");
-    drop(camera);
-    plugged.unplug()?;
-    wait(false)?;
-    Ok(())
-}
-
-fn cycles(count: u32) -> Outcome<()> {
-    let fds = || fs::read_dir("/proc/self/fd").map_or(0, Iterator::count);
-    let mut before = 0;
-    for cycle in 0..count {
-        let plugged = plug(if cycle % 2 == 0 { Wire::Bulk } else { Wire::Isochronous })?;
-        let video = wait(true)?;
-        let mut camera = Realsense::open(&video, None, settings())?;
-        for _ in 0..2 {
-            let frame = camera.next_frame()?.ok_or("the stream ended")?;
-            if !is_identical(&frame) {
-                return Err("a frame is not what the model sent".into());
-            }
-        }
-        plugged.unplug()?;
-        let ended = loop {
-            match camera.next_frame() {
-                Ok(Some(_)) => {}
-                Ok(None) => return Err("the stream ended without saying why".into()),
-                Err(error) => break error.to_string(),
-            }
-        };
-        if !ended.contains("unplugged") {
-            return Err(ended.into());
-        }
-        drop(camera);
-        wait(false)?;
-        match cycle {
-            0 => before = fds(),
-            _ if fds() > before => return Err(format!("{} open files, {before} at first", fds()).into()),
-            _ => {}
-        }
-    }
-    println!("WIRE realsense unplug PASS {count}/{count}");
-    Ok(())
 }
