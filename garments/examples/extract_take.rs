@@ -29,6 +29,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         garments.push(subject.take(input, &layers, n, &output.join(&layers[n]))?);
     }
     let body0 = subject.body.posed_mesh(&subject.poses[0]);
+    for (layer, mesh) in layers[1..].iter().zip(&garments) {
+        ply::write(&output.join(layer).join("unstacked.ply"), mesh)?;
+    }
     let clock = Instant::now();
     let report = stack(&body0, &mut garments, &StackSettings::default(), &|_| ())?;
     println!("stacked in {:.2} s", clock.elapsed().as_secs_f32());

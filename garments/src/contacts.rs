@@ -9,13 +9,14 @@ use toile_geometry::{
 
 use crate::{
     StackSettings,
+    region::Region,
     worn_surface::{Place, WornSurface},
 };
 
 /// Pushes aim this much beyond the gap, so that rounds end.
 const AIM: f32 = 1.15;
 /// Heights under this share of the gap are pushed.
-const ENOUGH: f32 = 0.9;
+const ENOUGH: f32 = 0.8;
 /// Lower vertices are looked at when the upper layer is this near, metres.
 const NEAR: f32 = 0.02;
 /// Samples in a parallel chunk.
@@ -41,6 +42,14 @@ pub struct Anchor {
     pub corners: [u32; 3],
     /// Its barycentric coordinates on them.
     pub weights: [f32; 3],
+}
+
+impl Anchor {
+    /// The vertex that carries most of the point.
+    pub fn nearest_corner(&self) -> u32 {
+        let most = (0..3).max_by(|&a, &b| self.weights[a].total_cmp(&self.weights[b]));
+        self.corners[most.unwrap_or(0)]
+    }
 }
 
 /// Remembers how far each sample of each pair of layers is from needing a push, so that a round looks only at those
@@ -75,14 +84,25 @@ impl Contacts {
 
     /// Takes the distances moved (by surface and vertex; empty where none was) off the slacks.
     pub fn moved(&mut self, surfaces: &[WornSurface], moved: &[Vec<f32>], reach: f32) {
-        let swept: Vec<_> = surfaces.iter().zip(moved).map(|(s, m)| Swept::new(&s.mesh.positions, m, reach)).collect();
+        let all = Region { low: [f32::NEG_INFINITY; 3].into(), high: [f32::INFINITY; 3].into() };
+        self.moved_in(&[all], moved, surfaces, reach);
+    }
+
+    /// As [`Contacts::moved`], where nothing moved outside some regions: what is beyond reach of all is left alone.
+    pub fn moved_in(&mut self, regions: &[Region], moved: &[Vec<f32>], surfaces: &[WornSurface], reach: f32) {
+        let swept = |(surface, moved): (&WornSurface, &Vec<f32>)| -> Vec<Swept> {
+            let new = |r: &Region| Swept::new(&surface.mesh.positions, moved, r, reach);
+            if moved.is_empty() { Vec::new() } else { regions.iter().map(new).collect() }
+        };
+        let swept: Vec<Vec<Swept>> = surfaces.iter().zip(moved).map(swept).collect();
         for pair in &mut self.pairs {
             let (upper, lower) = (pair.upper, pair.lower);
             let sides = [(&mut pair.vertices, upper, lower), (&mut pair.lower_vertices, lower, upper)];
             for (slacks, own, other) in sides {
                 for (v, slack) in slacks.iter_mut().enumerate() {
                     let p = &surfaces[own].mesh.positions[v];
-                    *slack -= moved[own].get(v).copied().unwrap_or(0.0) + swept[other].at(p);
+                    let of_other = swept[other].iter().map(|s| s.at(p)).fold(0.0, f32::max);
+                    *slack -= moved[own].get(v).copied().unwrap_or(0.0) + of_other;
                 }
             }
         }
@@ -140,10 +160,10 @@ struct Swept {
 }
 
 impl Swept {
-    fn new(positions: &[Point3<f32>], moved: &[f32], reach: f32) -> Self {
+    fn new(positions: &[Point3<f32>], moved: &[f32], region: &Region, reach: f32) -> Self {
         let (mut low, mut high) = ([f32::INFINITY; 3].into(), [f32::NEG_INFINITY; 3].into());
         let mut most = 0.0f32;
-        for (p, &m) in positions.iter().zip(moved).filter(|(_, m)| **m > 0.0) {
+        for (p, &m) in positions.iter().zip(moved).filter(|(p, m)| **m > 0.0 && region.holds(p)) {
             (low, high, most) = (p.inf(&low), p.sup(&high), most.max(m));
         }
         let around = Vector3::repeat(reach);

@@ -1,18 +1,29 @@
-//! The last resort of stacking: the few triangles that still cross are cut out of the upper layer. Vertices stay, so
+//! The last resort of stacking: the few triangles that still cross or come too near are cut out of the upper layer. Vertices stay, so
 //! that what goes with them (weights, attributes) stays valid.
 
 use std::collections::BTreeSet;
 
-use toile_geometry::intersection::{crossings, self_crossings};
+use toile_geometry::{
+    Mesh,
+    intersection::{crossings, self_crossings},
+};
 
-use crate::worn_surface::WornSurface;
+use crate::{StackSettings, contacts::Contact, worn_surface::WornSurface};
 
 /// More than this share of a layer's triangles is not cut: such a layer cannot be parted.
 const MOST: f32 = 0.005;
+/// A contact that lacks more than this many gaps of what it aims at is under two thirds of the gap.
+const TOO_NEAR: f32 = 0.5;
 
-/// Cuts the triangles of surface `upper` that cross a surface below, and of each pair that crosses within the layer but
-/// is not among `own_before` one. Returns how many triangles were cut.
-pub fn cut_rest(surfaces: &mut [WornSurface], upper: usize, own_before: &[[u32; 2]]) -> usize {
+/// Cuts the triangles of surface `upper` that cross a surface below, those whose contact among `left` lacks too much, and
+/// of each pair that crosses within the layer but is not among `own_before` one. Returns how many triangles were cut.
+pub fn cut_rest(
+    surfaces: &mut [WornSurface],
+    upper: usize,
+    own_before: &[[u32; 2]],
+    left: &[Contact],
+    settings: &StackSettings,
+) -> usize {
     let mesh = &surfaces[upper].mesh;
     let mut cut: BTreeSet<u32> =
         surfaces[..upper].iter().flat_map(|l| crossings(mesh, &l.mesh, &l.bvh)).map(|pair| pair[0]).collect();
@@ -21,20 +32,37 @@ pub fn cut_rest(surfaces: &mut [WornSurface], upper: usize, own_before: &[[u32; 
             cut.insert(pair[1]);
         }
     }
+    let lacks = |c: &&Contact| c.upper.surface == upper && c.by.norm() > TOO_NEAR * settings.gap;
+    let near: BTreeSet<u32> = left.iter().filter(lacks).map(|c| c.upper.nearest_corner()).collect();
+    let at_near = |t: &u32| mesh.triangles[*t as usize].iter().any(|v| near.contains(v));
+    cut.extend((0..mesh.triangles.len() as u32).filter(at_near));
     if cut.is_empty() || cut.len() as f32 > MOST * mesh.triangles.len() as f32 {
         return 0;
     }
     let mut rest = mesh.clone();
     let kept = (0u32..).zip(&mesh.triangles).filter(|(t, _)| !cut.contains(t));
     rest.triangles = kept.map(|(_, &corners)| corners).collect();
+    tidy(&mut rest, mesh, &cut);
     surfaces[upper] = WornSurface::new(&rest);
     cut.len()
+}
+
+/// Vertices that lost all their triangles go where a vertex lies that kept some, so that none strays.
+fn tidy(rest: &mut Mesh, mesh: &Mesh, cut: &BTreeSet<u32>) {
+    let mut kept = vec![false; mesh.positions.len()];
+    rest.triangles.iter().flatten().for_each(|&v| kept[v as usize] = true);
+    let around: BTreeSet<u32> = cut.iter().flat_map(|&t| mesh.triangles[t as usize]).collect();
+    for &lost in around.iter().filter(|v| !kept[**v as usize]) {
+        let p = mesh.positions[lost as usize];
+        let distance = |v: &&u32| (mesh.positions[**v as usize] - p).norm_squared();
+        let near = around.iter().filter(|v| kept[**v as usize]).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        rest.positions[lost as usize] = near.map_or(p, |&v| mesh.positions[v as usize]);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::Point3;
-    use toile_geometry::Mesh;
 
     use super::*;
 
@@ -51,10 +79,11 @@ mod tests {
         };
         let spike = |i: u32, j: u32| if (i, j) == (15, 15) { -0.005 } else { 0.003 };
         let mut surfaces = [sheet(&|_, _| 0.0), sheet(&spike)];
-        assert_eq!(cut_rest(&mut surfaces, 1, &[]), 6);
+        assert_eq!(cut_rest(&mut surfaces, 1, &[], &[], &StackSettings::default()), 6);
         assert_eq!(surfaces[1].mesh.positions.len() as u32, n * n);
-        assert_eq!(cut_rest(&mut surfaces, 1, &[]), 0);
+        assert!(surfaces[1].mesh.positions.iter().all(|p| p.z == 0.003), "nothing strays");
+        assert_eq!(cut_rest(&mut surfaces, 1, &[], &[], &StackSettings::default()), 0);
         let mut through = [sheet(&|_, _| 0.0), sheet(&|i, _| i as f32 * 0.001 - 0.0152)];
-        assert_eq!(cut_rest(&mut through, 1, &[]), 0);
+        assert_eq!(cut_rest(&mut through, 1, &[], &[], &StackSettings::default()), 0);
     }
 }

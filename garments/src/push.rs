@@ -28,17 +28,19 @@ pub struct Cloth {
     system: SurfaceSystem,
     neighbors: VertexNeighbors,
     edge_length: f32,
+    held: Vec<bool>,
 }
 
 impl Cloth {
-    /// Reads a mesh, in one or many pieces.
-    pub fn new(mesh: &Mesh) -> Self {
+    /// Reads a mesh, in one or many pieces, and which of its vertices stay.
+    pub fn new(mesh: &Mesh, held: Vec<bool>) -> Self {
         let area = mesh.area() as f32 / mesh.triangles.len().max(1) as f32;
         Self {
             system: SurfaceSystem::new(mesh),
             neighbors: VertexNeighbors::new(mesh.positions.len(), &mesh.triangles),
             // The side of an equilateral triangle of the mean area.
             edge_length: (area * 4.0 / 3.0f32.sqrt()).sqrt().max(1e-4),
+            held,
         }
     }
 
@@ -56,6 +58,9 @@ impl Cloth {
         for push in pushes {
             for (&v, w) in push.corners.iter().zip(push.weights) {
                 let v = local[v as usize] as usize;
+                if v >= patch.len() {
+                    continue;
+                }
                 mass[v] += STIFF * w;
                 (0..3).for_each(|k| right[k][v] += STIFF * w * push.by[k]);
             }
@@ -75,7 +80,9 @@ impl Cloth {
     fn around(&self, pushes: &[Push], spread: f32) -> Vec<u32> {
         let rings = (FAR * spread / self.edge_length).ceil() as usize;
         let seeds = pushes.iter().flat_map(|p| p.corners).collect();
-        grow(seeds, &self.neighbors, rings)
+        let mut around = grow(seeds, &self.neighbors, rings);
+        around.retain(|&v| !self.held[v as usize]);
+        around
     }
 }
 

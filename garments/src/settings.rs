@@ -68,7 +68,7 @@ pub struct StackSettings {
     pub gap: f32,
     /// Distance over which a push spreads into its surroundings, metres. Default 0.015.
     pub spread: f32,
-    /// Most rounds. Default 80.
+    /// Most rounds in each region, each time that it is solved. Default 80.
     pub rounds: usize,
     /// Heights are read up to this distance from a lower layer, metres. Default 0.05.
     pub reach: f32,

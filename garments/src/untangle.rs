@@ -18,6 +18,11 @@ const STEPS: usize = 4;
 
 /// Smooths around the triangles of `mesh` that cross one another. Returns how many pairs are left.
 pub fn untangle(mesh: &mut Mesh) -> usize {
+    untangle_but(mesh, &[])
+}
+
+/// As [`untangle`], where vertices that are `held` stay (all others may move).
+pub fn untangle_but(mesh: &mut Mesh, held: &[bool]) -> usize {
     let mut pairs = self_crossings(mesh, &Bvh::new(&mesh.positions, &mesh.triangles));
     if pairs.is_empty() {
         return 0;
@@ -25,7 +30,8 @@ pub fn untangle(mesh: &mut Mesh) -> usize {
     let neighbors = VertexNeighbors::new(mesh.positions.len(), &mesh.triangles);
     for round in 0..ROUNDS {
         let seeds = pairs.iter().flatten().flat_map(|&t| mesh.triangles[t as usize]);
-        let patch = grow(seeds.collect(), &neighbors, RINGS + round / 3);
+        let mut patch = grow(seeds.collect(), &neighbors, RINGS + round / 3);
+        patch.retain(|&v| held.get(v as usize) != Some(&true));
         smooth(mesh, &neighbors, &patch, STEPS);
         // Only what moved can cross anew, and all that crossed has moved.
         let mut moved = vec![false; mesh.positions.len()];
@@ -41,7 +47,7 @@ pub fn untangle(mesh: &mut Mesh) -> usize {
 }
 
 /// Moves each vertex of the patch halfway to its neighbours' mean, `steps` times; vertices of a rim heed only the rim.
-pub fn smooth(mesh: &mut Mesh, neighbors: &VertexNeighbors, patch: &[u32], steps: usize) {
+fn smooth(mesh: &mut Mesh, neighbors: &VertexNeighbors, patch: &[u32], steps: usize) {
     let edges = Edges::new(&mesh.triangles);
     let mut rim = std::collections::BTreeMap::<u32, Vec<u32>>::new();
     for (&[a, b], _) in edges.vertices.iter().zip(&edges.uses).filter(|(_, u)| **u == 1) {
