@@ -47,7 +47,7 @@ gone() { # product id
     until_true is_unplugged "$1"
 }
 # More frames than are checked: a take ends by time, and lost frames are no fault while they are told.
-seconds_of() { awk "BEGIN { print ($1 + 30) / 30 }"; }
+seconds_of() { awk "BEGIN { print ($1 + $2) / 30 }"; } # frames, more
 # Our own program records from a model; the host compares the take with what the model sent.
 record() { # name, device, seconds of its clock
     echo "== $1, $(cut -d' ' -f1 /proc/uptime) s after the boot"
@@ -68,7 +68,7 @@ if wanted kinect2; then
     (
         serve 02c4 0 "$bin/examples/wire_kinect2" serve "$rig/kinect2-images"
         renice -n 10 $BASHPID
-        RAYON_NUM_THREADS=1 record kinect2 kinect2 "$(seconds_of "$(value wire_kinect2)")"
+        RAYON_NUM_THREADS=1 record kinect2 kinect2 "$(seconds_of "$(value wire_kinect2)" 5)"
         gone 02c4
     ) &
     kinect2=$!
@@ -77,7 +77,7 @@ fi
 if wanted kinect1; then
     serve 02ae 0 "$bin/examples/wire_kinect1" serve
     "$bin/toile" devices
-    record kinect1 kinect1 "$(seconds_of "$frames")"
+    record kinect1 kinect1 "$(seconds_of "$frames" 30)"
     . "$top/tests/wire/fidelity-kinect1.sh"
     tell "kinect1 first frame" "$bin/examples/wire_kinect1" first
     tell "kinect1 unplug" "$bin/examples/wire_kinect1" cycles "$cycles"
@@ -86,7 +86,7 @@ fi
 if wanted realsense; then
     for wire in bulk isochronous; do
         serve 0b07 6 "$bin/examples/wire_realsense" serve $wire
-        record realsense-$wire realsense "$(seconds_of "$frames")"
+        record realsense-$wire realsense "$(seconds_of "$frames" 30)"
         [ $wire = bulk ] || . "$top/tests/wire/fidelity-d435.sh"
         gone 0b07
         tell "realsense-$wire first frame" "$bin/examples/wire_realsense" first $wire
