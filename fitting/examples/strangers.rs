@@ -3,17 +3,31 @@
 //! misses goes to the folder OUT.
 //!
 //! Cases: `patchy` (a fifth of the surface missing, 2 mm of noise), `full`, `half` (missing), `front` (one Kinect v2
-//! view), `wild` (as patchy, in poses twice as varied), `wilder` (three times).
+//! view), `wild` (as patchy, in poses twice as varied), `wilder` (three times), `chair` (one attached), `two` (people).
 
 use std::{path::Path, time::Instant};
 
+use nalgebra::Isometry3;
 use toile_character::{BodyModel, Joint};
 use toile_fitting::{FitSettings, Verdict, fit_body, measure::stature, measure_table};
-use toile_geometry::ply;
+use toile_geometry::{Mesh, ply};
 
 #[path = "../tests/common/mod.rs"]
 mod common;
-use common::{Numbers, joint_distance, strangers};
+use common::{Numbers, cuboid, finer, joined, joint_distance, strangers};
+
+/// A chair that stands close behind a person.
+fn chair(person: &Mesh) -> Mesh {
+    let (low, high) = person.bounds().unwrap_or_default();
+    let (x, z) = (0.5 * (low.x + high.x), 0.5 * (low.z + high.z) - 0.25);
+    let part = |from: [f32; 3], to: [f32; 3]| {
+        let at = |c: [f32; 3]| [x + c[0], low.y + c[1], z + c[2]];
+        finer(&cuboid(at(from), at(to)), 3)
+    };
+    let leg = |x: f32, z: f32| part([x - 0.02, 0.0, z - 0.02], [x + 0.02, 0.43, z + 0.02]);
+    let (seat, back) = (part([-0.22, 0.43, -0.22], [0.22, 0.47, 0.22]), part([-0.22, 0.47, -0.22], [0.22, 0.9, -0.18]));
+    joined(&[seat, back, leg(-0.2, -0.2), leg(0.2, -0.2), leg(-0.2, 0.2), leg(0.2, 0.2)])
+}
 
 #[allow(clippy::print_stdout)]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -41,7 +55,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let front = pose.rotation(Joint::Hips) * nalgebra::Vector3::z();
             strangers::one_view(&truth, front.x.atan2(front.z), &mut numbers)
         } else {
-            strangers::scanned(&model, &truth, missing, 0.002, &mut numbers)
+            let scan = strangers::scanned(&model, &truth, missing, 0.002, &mut numbers);
+            match case {
+                "chair" => joined(&[scan, chair(&truth)]),
+                "two" => joined(&[scan.clone(), scan.transformed(&Isometry3::translation(0.35, 0.0, 0.2))]),
+                _ => scan,
+            }
         };
         let start = Instant::now();
         let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {})?;

@@ -1,7 +1,7 @@
-//! Wrists and fingers, once the body stands: a few hundred vertices, thirty-two joints.
+//! Hands, once the body stands: wrists and fingers, or wrists and arms in a later take; a few hundred vertices.
 
 use toile_character::{BodyModel, Joint, Pose, Region, SkinnedMesh, joint::JOINTS};
-use toile_geometry::Mesh;
+use toile_geometry::{Mesh, mesh::vertex_normals};
 
 use crate::{
     FitSettings, FittingError,
@@ -20,7 +20,16 @@ const NEAR: f32 = 0.03;
 /// Least part of the hands' area with scan near it; below, the fingers stay at rest.
 const LEAST_SEEN: f32 = 0.3;
 const WRISTS: [Joint; 2] = [Joint::LeftHand, Joint::RightHand];
-/// Standard deviation of the turn of wrists from one take to the next, radians (3.4°).
+const ARMS: [(Region, [Joint; 2]); 2] = [
+    (Region::LeftArm, [Joint::LeftUpperArm, Joint::LeftLowerArm]),
+    (Region::RightArm, [Joint::RightUpperArm, Joint::RightLowerArm]),
+];
+/// An arm is hidden where less than this part of it lies within [`ON_SCAN`] (metres) of the scan.
+const ARM_SEEN: f64 = 0.5;
+const ON_SCAN: f32 = 0.004;
+/// Sampling of the scan for that, metres.
+const ARM_CELL: f32 = 0.008;
+/// Standard deviation of the turn of arms and wrists that is left to find in the next take, radians (3.4°).
 const AGAIN_SIGMA: f64 = 0.06;
 
 /// Turns wrists and fingers of the statistical body to the scan; everything else stays. Hands that the scan does not
@@ -40,8 +49,9 @@ pub(crate) fn fit_fingers(
     turned(&body, scan, trust, &prior, Turn { joints, noise: 0.015, shape_sigma: settings.shape_sigma }, state)
 }
 
-/// The same, wrists only, for a body whose own shape is known (template topology), from a pose that is nearly right: the hands of
-/// the person who stepped onto the table again. A pose that agrees less with the scan is not taken.
+/// The same for a body whose own shape is known (template topology), from a pose that is nearly right: wrists turn, and arms that
+/// sleeves hide bring the hands where they are seen. The trunk and arms that are seen stay. A pose that agrees less with the
+/// scan is not taken.
 pub(crate) fn fit_hands_again(
     model: &BodyModel,
     body: &SkinnedMesh,
@@ -49,12 +59,31 @@ pub(crate) fn fit_hands_again(
     trust: &[f32],
     pose: &Pose,
 ) -> Result<Pose, FittingError> {
+    let mut joints = WRISTS.to_vec();
+    joints.extend(hidden_arms(model, body, scan, trust, pose));
     let body = Articulated::of_skinned(body, &hands(model, &body.mesh));
     let state = State { pose: pose.clone(), beta: Vec::new() };
     let prior = JointPrior::around(pose.clone(), AGAIN_SIGMA);
     // fingers stay: how they moved since is finer than a scan in which they often melt together
-    let turn = Turn { joints: WRISTS.to_vec(), noise: 0.004, shape_sigma: 1.0 };
+    let turn = Turn { joints, noise: 0.004, shape_sigma: 1.0 };
     Ok(turned(&body, scan, trust, &prior, turn, state)?.pose)
+}
+
+/// Joints of the arms that the scan does not show.
+fn hidden_arms(model: &BodyModel, body: &SkinnedMesh, scan: &Mesh, trust: &[f32], pose: &Pose) -> Vec<Joint> {
+    let Some(cloud) = Cloud::new(Samples::of_mesh(scan, &scan.normals, trust, ARM_CELL)) else { return Vec::new() };
+    let points = body.posed(pose);
+    let normals = vertex_normals(&points, &body.mesh.triangles);
+    let on_scan = |v: &usize| {
+        let near = cloud.nearest(&points[*v], &normals[*v], 2.0 * ARM_CELL, 0.5).map(|q| q as usize);
+        near.is_some_and(|q| (points[*v] - cloud.samples.points[q]).dot(&cloud.samples.normals[q]).abs() < ON_SCAN)
+    };
+    let is_hidden = |region: Region| {
+        let of_arm: Vec<usize> = (0..points.len()).filter(|&v| model.regions[v] == region).collect();
+        let seen = of_arm.iter().filter(|v| on_scan(v)).count();
+        (seen as f64) < ARM_SEEN * of_arm.len() as f64
+    };
+    ARMS.iter().filter(|arm| is_hidden(arm.0)).flat_map(|arm| arm.1).collect()
 }
 
 /// Samples of both hands' skin.

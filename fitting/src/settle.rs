@@ -1,4 +1,4 @@
-//! The known body inside a dressed scan, once the pose is found: hands turned to what is seen, no skin outside.
+//! The known body inside a dressed scan, once the pose is found: hands brought to where they are seen, no skin outside.
 
 use serde::Serialize;
 use toile_character::{BodyModel, Pose, SkinnedMesh};
@@ -9,7 +9,7 @@ use crate::{FittingError, body_fit::trust_of, contain::contained, fingers::fit_h
 /// The body under a dressed scan.
 #[derive(Debug, Clone)]
 pub struct SettledBody {
-    /// The pose, with wrists and fingers turned to this scan.
+    /// The pose, with arms and wrists turned so that the hands lie on this scan.
     pub pose: Pose,
     /// The body in that pose and the scan's frame, drawn inside the scan; template topology.
     pub mesh: Mesh,
@@ -20,7 +20,7 @@ pub struct SettledBody {
 /// What settling the body moved.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SettleReport {
-    /// Largest turn of a wrist or finger joint, degrees.
+    /// Largest turn of an arm's joint or wrist, degrees.
     pub hand_turn_deg: f64,
     /// Part of the body's vertices that were moved by more than half a millimetre, 0–1.
     pub moved: f64,
@@ -29,7 +29,7 @@ pub struct SettleReport {
 }
 
 /// Settles the body (its own shape at rest, template topology of `model`) in `pose` (from [`crate::pose_under`]) inside
-/// `scan`: turns the hands to what is seen of them, then moves skin that lies over the scan inward. Skin that cloth
+/// `scan`: brings the hands to what is seen of them, then moves skin that lies over the scan inward. Skin that cloth
 /// covers keeps its shape. Same result for any number of threads.
 ///
 /// # Errors

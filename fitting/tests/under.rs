@@ -137,6 +137,38 @@ fn a_wrist_that_turned_since_the_last_take_is_turned_again() {
 }
 
 #[test]
+fn an_arm_that_went_astray_under_its_sleeve_is_brought_back_by_its_hand() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 18, 0.0);
+    let body = model.skinned(&truth.beta);
+    let mut scan = dressed(&model, &truth.beta, &truth.pose, 0.01);
+    for v in (0..scan.positions.len()).filter(|&v| matches!(model.regions[v], Region::LeftArm | Region::RightArm)) {
+        let sleeve = scan.normals[v] * 0.012;
+        scan.positions[v] += sleeve;
+    }
+    let astray = |by: f64| {
+        let mut pose = truth.pose.clone();
+        for (joint, turn) in [(Joint::LeftUpperArm, Vector3::z()), (Joint::RightUpperArm, Vector3::x())] {
+            let rotation = pose.rotation_mut(joint);
+            *rotation = UnitQuaternion::from_scaled_axis(turn * by) * *rotation;
+        }
+        pose
+    };
+    let (astray, slightly) = (astray(0.025), astray(0.008));
+    let settled = settle_under(&model, &body, &astray, &scan).unwrap();
+    let at = |pose: &Pose, joint: Joint| pose.joint_positions(&body.skeleton)[joint.index()];
+    for wrist in [Joint::LeftHand, Joint::RightHand] {
+        let off = |pose: &Pose| (at(pose, wrist) - at(&truth.pose, wrist)).norm();
+        let (was, is) = (off(&astray), off(&settled.pose));
+        assert!(was > 0.006 && is < 0.35 * was, "{wrist:?}: {is} of {was} m left");
+    }
+    // an arm that is seen stays, however its hand lies
+    let bare = settle_under(&model, &body, &slightly, &body.posed_mesh(&truth.pose)).unwrap();
+    let elbow = |pose: &Pose| at(pose, Joint::LeftLowerArm);
+    assert!((elbow(&bare.pose) - elbow(&slightly)).norm() < 1e-6);
+}
+
+#[test]
 fn a_smaller_person_is_no_match() {
     let model = BodyModel::load_default().unwrap();
     let truth = person(&model, 13, 0.0);
