@@ -1,6 +1,6 @@
 //! Takes the garments of a processed subject out again and stacks them: a tool to develop with.
 //!
-//!     cargo run --release -p toile-garments --example extract_take -- BUILD OUT
+//!     cargo run --release -p toile-garments --example extract_take -- BUILD OUT [--no-stack]
 //!
 //! BUILD is a subject's build folder with scans, poses and the body. OUT gets garments in the same layout, and for each
 //! take `labels.ply`: the scan with what was measured and decided as vertex attributes. All types are guessed.
@@ -15,8 +15,9 @@ use toile_garments::{
 use toile_geometry::{Mesh, ply};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [input, output] = &arguments[..] else { return Err("usage: extract_take BUILD OUT".into()) };
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    let stacks = arguments.pop_if(|a| a == "--no-stack").is_none();
+    let [input, output] = &arguments[..] else { return Err("usage: extract_take BUILD OUT [--no-stack]".into()) };
     let (input, output) = (Path::new(input), Path::new(output));
     let mut layers: Vec<String> = std::fs::read_dir(input)?
         .filter_map(|e| e.ok()?.file_name().into_string().ok())
@@ -33,9 +34,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         ply::write(&output.join(layer).join("unstacked.ply"), mesh)?;
     }
     let clock = Instant::now();
-    let report = stack(&body0, &mut garments, &StackSettings::default(), &|_| ())?;
-    println!("stacked in {:.2} s", clock.elapsed().as_secs_f32());
-    report.layers.iter().for_each(|l| println!("  {l:?}"));
+    if stacks {
+        let report = stack(&body0, &mut garments, &StackSettings::default(), &|_| ())?;
+        println!("stacked in {:.2} s", clock.elapsed().as_secs_f32());
+        report.layers.iter().for_each(|l| println!("  {l:?}"));
+    }
     std::fs::create_dir_all(output.join("body"))?;
     ply::write(&output.join("body/body.ply"), &body0)?;
     for (layer, mesh) in layers[1..].iter().zip(&garments) {

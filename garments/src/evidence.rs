@@ -18,6 +18,10 @@ use crate::{
 /// Least scales that are believed, metres and colour units: no sensor does better.
 const LEAST_DISTANCE_NOISE: f32 = 0.0007;
 const LEAST_COLOR_NOISE: f32 = 1.5;
+/// Cloth worn before lies otherwise in each take, by this share of its distance from the body.
+const SLIP_SHARE: f32 = 0.2;
+/// At this distance from the body half of it does, metres.
+const SLIPS: f32 = 0.03;
 /// Largest scale that uncovered skin can explain, metres and colour units.
 const MOST_DISTANCE_NOISE: f32 = 0.004;
 const MOST_COLOR_NOISE: f32 = 8.0;
@@ -37,6 +41,8 @@ const COLOR_RANGE: f32 = 60.0;
 pub struct Evidence {
     /// Signed height over the earlier surface, metres; infinite where none is within reach.
     pub height: Vec<f32>,
+    /// Distance from the earlier surface whichever way it faces, metres; infinite where none is within reach.
+    pub clearance: Vec<f32>,
     /// Colour difference from the nearest place of the earlier surface; NaN where either was not seen.
     pub color: Vec<f32>,
     /// Cosine between the scan's normal and the earlier surface's: small where a hem's edge drops to what is below.
@@ -55,12 +61,6 @@ pub struct Evidence {
 
 /// Measures a take.
 pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Evidence {
-    let before = Before::new(take.previous);
-    let compared: Vec<[f32; 3]> = (0..graph.len())
-        .into_par_iter()
-        .map(|v| before.compare(&take.scan.positions[v], &graph.normals[v], graph.lab.get(v), settings))
-        .collect();
-    let column = |k: usize| compared.iter().map(|row| row[k]).collect::<Vec<f32>>();
     let body = Bvh::new(&take.body.positions, &take.body.triangles);
     let shares = part_shares(take.weights);
     let body_normals = take.body.triangle_normals();
@@ -78,11 +78,18 @@ pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Ev
             None => ([0.0; PART_COUNT], [f32::INFINITY, 0.0]),
         })
         .unzip();
-    let (body_distance, body_facing) = on_body.into_iter().map(|[distance, facing]| (distance, facing)).unzip();
+    let (body_distance, body_facing): (Vec<f32>, _) = on_body.into_iter().map(|[far, facing]| (far, facing)).unzip();
+    let before = Before::new(take.previous);
+    let compared: Vec<[f32; 4]> = (0..graph.len())
+        .into_par_iter()
+        .map(|v| before.compare(&take.scan.positions[v], &graph.normals[v], graph.lab.get(v), settings))
+        .collect();
+    let column = |k: usize| compared.iter().map(|row| row[k]).collect::<Vec<f32>>();
     let color = column(1).into_iter().zip(&graph.filled).map(|(c, &f)| if f > 0.5 { f32::NAN } else { c }).collect();
-    let (height, facing) = (column(0), column(2));
+    let (height, facing, clearance) = (column(0), column(2), column(3));
+    let (height_noise, color_noise) = (0.0, 0.0);
     let mut evidence =
-        Evidence { height, color, facing, parts, body_distance, body_facing, height_noise: 0.0, color_noise: 0.0 };
+        Evidence { height, clearance, color, facing, parts, body_distance, body_facing, height_noise, color_noise };
     evidence.estimate_noise();
     evidence
 }
@@ -90,16 +97,22 @@ pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Ev
 impl Evidence {
     /// Natural log odds of "new" against "old" at vertex `v`, from height and colour.
     pub fn log_odds(&self, v: usize) -> f32 {
-        self.height_log_odds(self.height[v]) + self.color_log_odds(self.color[v])
+        self.height_log_odds(self.height[v], self.body_distance[v] - self.height[v])
+            + self.color_log_odds(self.color[v])
     }
 
-    /// Uncovered skin is a Laplacian around zero with rare outliers; new cloth stands off it by an exponential height.
-    fn height_log_odds(&self, height: f32) -> f32 {
+    /// Uncovered skin is a Laplacian around zero with rare outliers; earlier cloth, `slack` metres off the body, one with
+    /// a second, wider part; new cloth stands off either by an exponential height.
+    fn height_log_odds(&self, height: f32, slack: f32) -> f32 {
         if !height.is_finite() {
             return 3.0;
         }
         let b = self.height_noise;
-        let old = 0.97 * (-height.abs() / b).exp() / (2.0 * b) + 0.03 / 0.06;
+        let laplacian = |scale: f32| (-height.abs() / scale).exp() / (2.0 * scale);
+        let slack = slack.max(0.0);
+        let slipped = slack / (slack + SLIPS);
+        let lies = (1.0 - slipped) * laplacian(b) + slipped * laplacian(b.max(SLIP_SHARE * slack));
+        let old = 0.97 * lies + 0.03 / 0.06;
         let press = b.max(CLOTH_PRESS);
         let shape = if height >= 0.0 { (-height / CLOTH_HEIGHT).exp() } else { (height / press).exp() };
         let new = shape / CLOTH_SPREAD;
@@ -169,19 +182,19 @@ impl<'a> Before<'a> {
         }
     }
 
-    /// Signed height of `p` over the closest surface that faces the same way, the colour difference there, and the
-    /// cosine between the normals.
+    /// Signed height of `p` over the closest surface that faces the same way, the colour difference there, the cosine
+    /// between the normals, and the distance from the closest surface of any facing.
     fn compare(
         &self,
         p: &Point3<f32>,
         normal: &Vector3<f32>,
         lab: Option<&[f32; 3]>,
         settings: &ExtractSettings,
-    ) -> [f32; 3] {
+    ) -> [f32; 4] {
         let facing = |t: u32| self.normals[t as usize].dot(normal) > 0.2;
         let hit = self.bvh.closest_where(p, settings.reach, facing);
         let Some(hit) = hit.or_else(|| self.bvh.closest(p, settings.reach)) else {
-            return [f32::INFINITY, f32::NAN, 1.0];
+            return [f32::INFINITY, f32::NAN, 1.0, f32::INFINITY];
         };
         let sign = if (p - hit.point).dot(&self.normals[hit.triangle as usize]) >= 0.0 { 1.0 } else { -1.0 };
         let corner = self.mesh.triangles[hit.triangle as usize][largest(hit.barycentric)];
@@ -189,7 +202,8 @@ impl<'a> Before<'a> {
             Some(lab) if !self.lab.is_empty() => self.least_difference(corner, lab, settings.color_search),
             _ => f32::NAN,
         };
-        [sign * hit.distance, color, self.smooth_normal(&hit).dot(normal)]
+        let clearance = self.bvh.closest(p, hit.distance).map_or(hit.distance, |any| any.distance);
+        [sign * hit.distance, color, self.smooth_normal(&hit).dot(normal), clearance]
     }
 
     fn smooth_normal(&self, hit: &Closest) -> Vector3<f32> {

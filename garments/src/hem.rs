@@ -33,8 +33,14 @@ const LIP_DROP: f32 = 0.002;
 /// Cloth behind a hem must have this area to be believed, square metres.
 const LEAST_BEHIND: f32 = 5e-5;
 
+/// What faces up or down more than this (cosine) was not seen by a camera that circles the subject: its colour is carried
+/// over from the front of the cloth and tells nothing.
+const LEVEL: f32 = 0.7;
+/// Nearer to what was worn before, a pixel's blur colours a step, metres.
+const LEDGE: f32 = 0.012;
+
 /// Lowers the log odds of the steps at the garment's border. Where it has a `facing` (jackets and coats), what has the
-/// garment's colour past a fold is its turned-in edge and stays.
+/// garment's colour past a fold, and was seen, is its turned-in edge and stays.
 pub fn lower_steps(
     scan: &Mesh,
     graph: &ScanGraph,
@@ -46,11 +52,14 @@ pub fn lower_steps(
 ) {
     let depth = settings.hem_depth;
     let reached = border_distance(scan, graph, labels, depth);
-    let steps = step_vertices(graph, evidence, labels, color_odds, &reached);
+    let level = |v: usize| graph.normals[v].y.abs() > LEVEL;
+    let ledge = |v: usize| !facing && level(v) && evidence.clearance[v] > LEDGE;
+    let steps = step_vertices(graph, evidence, labels, &reached, |v| color_odds[v] > STEP_COLOR && !ledge(v));
     let slopes = slope_vertices(scan, graph, evidence, labels, &reached, depth);
-    let turned_in = |v: &u32| facing && color_odds[*v as usize] > STEP_COLOR && graph.filled[*v as usize] < 0.5;
-    let lips = lip_vertices(scan, graph, labels, &reached, depth).into_iter().filter(|v| !turned_in(v));
-    for v in steps.into_iter().chain(slopes).chain(lips) {
+    let lips = lip_vertices(scan, graph, labels, &reached, depth);
+    let seen = |v: usize| graph.filled[v] < 0.5 && !level(v);
+    let turned_in = |v: &u32| facing && color_odds[*v as usize] > STEP_COLOR && seen(*v as usize);
+    for v in steps.into_iter().chain(slopes).chain(lips.into_iter().filter(|v| !turned_in(v))) {
         labels.log_odds[v as usize] = labels.log_odds[v as usize].min(SLOPE_ODDS);
     }
 }
@@ -83,18 +92,17 @@ fn spread(scan: &Mesh, graph: &ScanGraph, starts: &[u32], farthest: f32, may: im
     reached
 }
 
-/// From the border inward, every vertex that faces away from the earlier surface and does not have the garment's
-/// colour.
+/// From the border inward, every vertex that faces away from the earlier surface and is not `colored` as the garment is.
 fn step_vertices(
     graph: &ScanGraph,
     evidence: &Evidence,
     labels: &Labels,
-    color_odds: &[f32],
     reached: &[f32],
+    colored: impl Fn(usize) -> bool,
 ) -> Vec<u32> {
     let steep = |v: u32| {
         let v = v as usize;
-        labels.garment[v] && evidence.facing[v] <= STEP_FACING && color_odds[v] <= STEP_COLOR && reached[v].is_finite()
+        labels.garment[v] && evidence.facing[v] <= STEP_FACING && !colored(v) && reached[v].is_finite()
     };
     let mut taken = vec![false; graph.len()];
     let mut stack: Vec<u32> = (0..graph.len() as u32).filter(|&v| reached[v as usize] == 0.0 && steep(v)).collect();

@@ -127,6 +127,22 @@ fn cloth_is_found_by_colour_and_shape_by_shape_alone_and_by_colour_alone() {
 }
 
 #[test]
+fn a_hem_ends_at_its_fold_and_not_on_the_ledge_below() {
+    let (person, pose, before) = (person(), Pose::identity(), bare());
+    // Fusion closes the space under a hanging hem by a ledge in the cloth's own colour.
+    let off = |y: f32| 0.03 * ((y - 0.28) / 0.02).clamp(0.0, 1.0) * f32::from(u8::from(y < 0.8));
+    let scan = column(|y, a| RADIUS + noise(y, a) + off(y), |y| if (0.287..0.8).contains(&y) { BLUE } else { SKIN });
+    let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    let loops = boundary_loops(&found.garment.triangles);
+    assert_eq!(loops.len(), 2);
+    let hem = loops.iter().find(|l| found.garment.positions[l[0] as usize].y < 0.5).unwrap();
+    for p in hem.iter().map(|&v| found.garment.positions[v as usize]) {
+        let radius = p.x.hypot(p.z) - RADIUS;
+        assert!(radius > 0.02, "the hem at {p} lies {radius} m off the body");
+    }
+}
+
+#[test]
 fn stripes_are_one_garment() {
     let (person, pose, before) = (person(), Pose::identity(), bare());
     let stripes = |y: f32| match () {

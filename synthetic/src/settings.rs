@@ -28,12 +28,26 @@ pub enum GarmentKind {
     Jumper,
     Jacket,
     Coat,
+    Dress,
+    Scarf,
+    Hat,
 }
 
 impl GarmentKind {
     /// All kinds.
-    pub const ALL: [Self; 8] =
-        [Self::Trousers, Self::Shorts, Self::Skirt, Self::Tshirt, Self::Blouse, Self::Jumper, Self::Jacket, Self::Coat];
+    pub const ALL: [Self; 11] = [
+        Self::Trousers,
+        Self::Shorts,
+        Self::Skirt,
+        Self::Tshirt,
+        Self::Blouse,
+        Self::Jumper,
+        Self::Jacket,
+        Self::Coat,
+        Self::Dress,
+        Self::Scarf,
+        Self::Hat,
+    ];
 
     /// The name in folders and files, such as `tshirt`.
     pub fn name(self) -> &'static str {
@@ -46,6 +60,9 @@ impl GarmentKind {
             Self::Jumper => "jumper",
             Self::Jacket => "jacket",
             Self::Coat => "coat",
+            Self::Dress => "dress",
+            Self::Scarf => "scarf",
+            Self::Hat => "hat",
         }
     }
 
@@ -90,6 +107,9 @@ impl GarmentSettings {
             GarmentKind::Jumper => Pattern::Plain([150, 60, 84]),
             GarmentKind::Jacket => Pattern::Denim([64, 88, 46]),
             GarmentKind::Coat => Pattern::Plaid([88, 78, 70], [140, 122, 96], 0.14),
+            GarmentKind::Dress => Pattern::Plaid([122, 34, 48], [196, 150, 140], 0.11),
+            GarmentKind::Scarf => Pattern::Stripes([56, 104, 96], [214, 196, 150], 0.04),
+            GarmentKind::Hat => Pattern::Plain([46, 52, 96]),
         };
         Self { kind, pattern }
     }

@@ -76,6 +76,8 @@ pub struct Tailoring {
     ends: Vec<Plane>,
     /// Around the neck, for tops.
     neckline: Option<Neckline>,
+    /// What a scarf stays within: the middle of the neck's root and a distance from it.
+    within: Option<(Point3<f32>, f32)>,
     /// Where the legs end (left and right), if the garment has legs.
     legs: Option<[Plane; 2]>,
     /// Where the sleeves end; without them the arms are left out.
@@ -114,6 +116,9 @@ impl Tailoring {
             GarmentKind::Jumper => measure.top(0.92, 0.045, 0.013, 0.8),
             GarmentKind::Jacket => measure.open_top(0.93, 0.07, 0.014),
             GarmentKind::Coat => measure.coat(0.94),
+            GarmentKind::Dress => measure.dress(0.22 + 0.03 * vary),
+            GarmentKind::Scarf => measure.scarf(),
+            GarmentKind::Hat => measure.hat(),
         }
     }
 
@@ -131,6 +136,9 @@ impl Tailoring {
         let mut out = self.ends.iter().map(|end| end.outside(p)).fold(-FAR, f32::max);
         if let Some(neckline) = &self.neckline {
             out = out.max(neckline.outside(p));
+        }
+        if let Some((center, radius)) = &self.within {
+            out = out.max((p - center).norm() - radius);
         }
         if let Some(legs) = &self.legs {
             out = out.max(legs[usize::from(p.x < 0.0)].outside(p));
@@ -206,6 +214,7 @@ impl Measure<'_> {
         Tailoring {
             ends: vec![waist],
             neckline: None,
+            within: None,
             legs: Some(self.legs(leg_share)),
             sleeves: None,
             opening: None,
@@ -227,6 +236,7 @@ impl Measure<'_> {
         Tailoring {
             ends: vec![waist, self.level(lower_end, false)],
             neckline: None,
+            within: None,
             legs: None,
             sleeves: None,
             opening: None,
@@ -248,6 +258,7 @@ impl Measure<'_> {
         Tailoring {
             ends: vec![self.level(lower_end, false)],
             neckline: Some(self.neckline(0.026)),
+            within: None,
             legs: None,
             sleeves: Some(self.sleeves(sleeve_share)),
             opening: None,
@@ -274,5 +285,48 @@ impl Measure<'_> {
         let jacket = self.open_top(sleeve_share, 0.0, 0.015);
         let ends = vec![self.level(lower_end, false)];
         Tailoring { ends, drape: 1.0, flare: 0.05, lower_end, opening: Some((0.03, 0.0)), ..jacket }
+    }
+
+    /// A top with short sleeves and a skirt in one.
+    fn dress(&self, sleeve_share: f32) -> Tailoring {
+        let (hip, knee) = (self.joint(Joint::LeftUpperLeg).y, self.joint(Joint::LeftLowerLeg).y);
+        let lower_end = knee + 0.1 * (hip - knee);
+        let top = self.top(sleeve_share, 0.0, 0.009, 0.7);
+        Tailoring { ends: vec![self.level(lower_end, false)], flare: 0.06, pleats: 0.01, lower_end, ..top }
+    }
+
+    /// A ring around the neck, wide enough to lie on the shoulders.
+    fn scarf(&self) -> Tailoring {
+        let (nape, throat) = (self.landmark("cervicale"), self.landmark("suprasternale"));
+        let center = nalgebra::center(&nape, &throat);
+        let lower_end = throat.y - 0.03;
+        let highest = self.landmark("chin").y - 0.01;
+        let jumper = self.top(0.0, 0.0, 0.016, 0.0);
+        Tailoring {
+            ends: vec![self.level(lower_end, false), self.level(highest, true)],
+            neckline: None,
+            sleeves: None,
+            within: Some((center, 0.13)),
+            flare: 0.0,
+            lower_end,
+            creases: 0.008,
+            crease_length: Vector3::new(0.07, 0.03, 0.07),
+            ..jumper
+        }
+    }
+
+    /// A cap down to the brows.
+    fn hat(&self) -> Tailoring {
+        let chin = self.landmark("chin").y;
+        let lower_end = chin + 0.62 * (self.landmark("vertex").y - chin);
+        let scarf = self.scarf();
+        Tailoring {
+            ends: vec![self.level(lower_end, false)],
+            within: None,
+            ease: 0.010,
+            creases: 0.003,
+            lower_end,
+            ..scarf
+        }
     }
 }
