@@ -182,10 +182,12 @@ impl Fuser {
         report.full_turn = report.turned_deg >= FULL_TURN_DEG;
         let span = self.kept.last().map_or(0, |k| k.device_time_ns) - self.kept[0].device_time_ns;
         report.rate_deg_per_s = report.turned_deg / (span as f64 * 1e-9).max(1e-6);
-        let upright = Axis { point: Point3::origin(), direction: Vector3::y() };
+        // Without a volume the model's frame is the first camera's, whose +Y points down.
+        let up = if self.volume.is_some() { Vector3::y() } else { -Vector3::y() };
+        let upright = Axis { point: Point3::origin(), direction: up };
         let axis = match axis {
             Some(mut a) if turned.abs() > 0.5 => {
-                if a.direction.y < 0.0 {
+                if a.direction.dot(&up) < 0.0 {
                     a.direction = -a.direction;
                 }
                 if self.volume.as_ref().is_some_and(|v| v.floor.is_some()) {

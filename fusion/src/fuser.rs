@@ -34,7 +34,7 @@ const DEPARTURE: (f64, f64) = (0.06, 0.12);
 /// Points that are compared by colour.
 const COLOR_POINTS: usize = 2500;
 /// An earlier frame that looks from within this angle shows the same surface, radians.
-const ANCHOR_ANGLE: f64 = 0.5;
+pub(crate) const ANCHOR_ANGLE: f64 = 0.5;
 /// A residual of so many standard deviations of the frame's own noise is trusted too: far rooms are noisy.
 const NOISE_RESIDUAL: f64 = 2.5;
 /// The band is at least this many standard deviations of the noise.
@@ -310,7 +310,7 @@ impl Fuser {
     /// The last frame, and the first one that looked from about where a pose looks from: the turn closes on it.
     fn color_anchors(&self, pose: &Rigid) -> Vec<usize> {
         let last = self.kept.len() - 1;
-        let near = |k: &Kept| k.scan_from_camera.rotation.angle_to(&pose.rotation) < ANCHOR_ANGLE;
+        let near = |k: &Kept| k.color.is_some() && k.scan_from_camera.rotation.angle_to(&pose.rotation) < ANCHOR_ANGLE;
         let mut anchors = vec![last];
         anchors.extend(self.kept.iter().position(near).filter(|i| *i != last));
         anchors

@@ -10,7 +10,7 @@
 //! 4. the frames are fused again and registered to the whole model;
 //! 5. [`surface`] extracts the mesh, [`clean_up`] makes it one closed, smooth, light surface.
 //!
-//! [`fuse`] runs all of it over a source; [`Fuser`] takes frames one by one.
+//! [`fuse`] runs all of it over a source; [`Fuser`] takes frames one by one; [`LiveFuser`] only follows, in little memory.
 
 mod band;
 pub mod clean_up;
@@ -25,6 +25,7 @@ pub mod fuser;
 pub mod integrate;
 mod lanes;
 mod layers;
+pub mod live;
 pub mod motion;
 pub mod noise;
 pub mod normals;
@@ -43,12 +44,15 @@ pub mod view;
 pub mod volume;
 
 #[cfg(test)]
+mod hard_cases;
+#[cfg(test)]
 mod test_scene;
 #[cfg(test)]
 mod tests;
 
 pub use error::FusionError;
 pub use fuser::{Fuser, Outcome};
+pub use live::LiveFuser;
 pub use report::{FusionReport, Timings};
 pub use scan::{Scan, TrackedFrame};
 pub use settings::{FusionSettings, KnownPose, Prior, Volume};

@@ -248,6 +248,23 @@ mod tests {
         }
     }
 
+    /// A sphere around the camera is faced everywhere; its rays of unit depth are longer than elements tell at the rim.
+    #[test]
+    fn what_lies_far_aside_is_faced_no_less_than_what_lies_ahead() {
+        let camera = PinholeCamera::ideal(201, 21, 30.0, 30.0, 100.0, 10.0);
+        let ray = |i: usize| unproject(&camera, (i % 201) as f32, (i / 201) as f32, 1.0);
+        let depth: Vec<f32> = (0..201 * 21).map(|i| 2.0 / dot(ray(i), ray(i)).sqrt()).collect();
+        let elements = surface_elements(&camera, &depth, 2);
+        let mut beyond = 0;
+        for i in (5 * 201..16 * 201).filter(|i| (4..197).contains(&(i % 201)) && elements[*i].is_some()) {
+            let length = dot(ray(i), ray(i)).sqrt();
+            let facing = elements[i].parts()[1];
+            assert!((facing + length.min(2.0)).abs() < 0.02, "pixel {i}: {facing}, {length}");
+            beyond += usize::from(length > 2.05);
+        }
+        assert!(beyond > 500, "{beyond}");
+    }
+
     #[test]
     fn lanes_of_any_kind_give_the_same_elements() {
         let camera = PinholeCamera::ideal(53, 21, 90.0, 92.0, 26.0, 10.0);

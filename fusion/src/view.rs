@@ -225,3 +225,34 @@ fn bilinear(image: &RgbImage, x: f32, y: f32) -> [u8; 3] {
         (top * (1.0 - fy) + low * fy).round() as u8
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use toile_capture::DeviceIdentity;
+    use toile_geometry::Rigid;
+
+    use super::*;
+
+    /// The colour camera sees the middle half of the depth camera's picture: what lies beyond has no colour, and not
+    /// that of the picture's rim.
+    #[test]
+    fn pixels_beyond_the_colour_picture_have_no_colour() {
+        let depth = PinholeCamera::ideal(80, 60, 100.0, 100.0, 39.5, 29.5);
+        let sensor = Sensor {
+            name: "narrow".into(),
+            identity: DeviceIdentity::default(),
+            depth,
+            depth_scale: 0.001,
+            color: Some(PinholeCamera::ideal(80, 60, 200.0, 200.0, 39.5, 29.5)),
+            color_from_depth: Rigid::identity(),
+            rig_from_depth: Rigid::identity(),
+            fps: 30.0,
+        };
+        let mut view = View::new(&depth, &[1.5; 80 * 60], 2);
+        view.add_colors(&RgbImage { width: 80, height: 60, pixels: vec![[9, 8, 7]; 80 * 60] }, &sensor);
+        for i in (0..80 * 60).filter(|i| view.elements[*i].is_some()) {
+            let is_seen = (20..60).contains(&(i % 80)) && (15..45).contains(&(i / 80));
+            assert_eq!(view.colors[i], if is_seen { [9, 8, 7, 255] } else { [0; 4] }, "{} {}", i % 80, i / 80);
+        }
+    }
+}
