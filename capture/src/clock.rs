@@ -1,5 +1,7 @@
 //! Clocks: which one stamps a device's frames, and what time it was on the host's.
 
+use std::time::SystemTime;
+
 use serde::{Deserialize, Serialize};
 
 /// Which clock a sensor's `device_time_ns` is of. Times of different domains must not be compared.
@@ -13,6 +15,12 @@ pub enum ClockDomain {
     HostMonotonic,
     /// The host's Unix clock.
     HostUnix,
+}
+
+/// The host's clock now: Unix, nanoseconds.
+pub fn host_now_ns() -> i64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 /// The device's clock may run away from the host's by this much, parts of one: quartz clocks keep to 100 ppm.

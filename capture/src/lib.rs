@@ -67,7 +67,7 @@ pub mod subject;
 pub mod trajectory;
 
 pub use atomic_write::{atomic_write, atomic_write_with};
-pub use clock::{ClockDomain, ClockFit};
+pub use clock::{ClockDomain, ClockFit, host_now_ns};
 pub use error::CaptureError;
 pub use frame::{ColorImage, DepthImage, Frame, RgbImage};
 pub use garment_type::GarmentType;

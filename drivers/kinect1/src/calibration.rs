@@ -116,6 +116,8 @@ impl Calibration {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     pub(crate) fn sample() -> Calibration {
@@ -150,5 +152,30 @@ mod tests {
         assert!(Calibration::parse(&zeros, &zeros, &zeros, &zeros).is_err());
         assert!(Calibration::parse(&zeros[..100], &zeros, &zeros, &zeros).unwrap_err().to_string().contains("short"));
         assert!(Calibration::parse(&zeros, &zeros[..100], &zeros, &zeros).is_err());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        /// Numbers that are in range and polynomials that are anything: tables are made of them all the same.
+        #[test]
+        fn no_answers_upset_the_calibration_and_its_tables(
+            mut fixed in prop::collection::vec(any::<u8>(), 0..340),
+            registration in prop::collection::vec(any::<u8>(), 100..130),
+            words in prop::collection::vec(any::<u8>(), 0..9),
+            plane in prop::option::of((3.0..15.0f32, 40.0..300.0f32, 0.03..0.3f32)),
+        ) {
+            if let (Some((emitter, reference, pixel)), true) = (plane, fixed.len() >= ZERO_PLANE + 16) {
+                let bytes = [emitter, 2.3, reference, pixel].map(f32::to_le_bytes);
+                fixed[ZERO_PLANE..ZERO_PLANE + 16].copy_from_slice(bytes.as_flattened());
+            }
+            let shift = [0, 0, 200, 0];
+            for padding in [&words[..], &[0; 4]] {
+                if let Ok(calibration) = Calibration::parse(&fixed, &registration, padding, &shift) {
+                    let depth = calibration.mm_from_raw();
+                    prop_assert!(depth.len() == 2048 && depth.iter().all(|mm| *mm <= MAX_MM));
+                    crate::registration::Registration::new(&calibration).register(&depth);
+                }
+            }
+        }
     }
 }

@@ -1,20 +1,18 @@
 //! The camera as a source of frames.
 
-use std::{
-    sync::Arc,
-    time::{Duration, SystemTime},
-};
+use std::{sync::Arc, time::Duration};
 
 use toile_capture::{
     CaptureError, ClockDomain, ClockFit, ColorImage, DepthImage, DeviceIdentity, Frame, RgbImage, Rig, Sensor, Source,
+    host_now_ns,
     pairing::{Pair, Pairing},
 };
 use toile_driver_transport::{Bus, DeviceInfo, Transfer, TransferStatus, TransportError, UsbDevice};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use crate::{
-    Calibration, Kinect1Error,
-    assembler::{Assembler, Losses},
+    Calibration, DepthMode, Health, Kinect1Error, Settings, VideoMode,
+    assembler::Assembler,
     commands::Commands,
     decode::{self, HEIGHT, INFRARED_HEIGHT, WIDTH, packed_size},
     protocol::{PACKET_ROOM, Stream},
@@ -37,80 +35,6 @@ const TICKS_PER_SECOND: f64 = 60e6;
 const FRAME_NS: f64 = 1e9 / FPS;
 /// Microframes a second: what an isochronous packet takes.
 const MICROFRAMES: f64 = 8000.0;
-
-/// How depth is sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum DepthMode {
-    /// Eleven bits a pixel: all that the sensor measures.
-    #[default]
-    Eleven,
-    /// Ten bits a pixel: 9 % less of the bus, half the depth resolution.
-    Ten,
-}
-
-/// What the video stream shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum VideoMode {
-    /// Colour, 640×480.
-    #[default]
-    Color,
-    /// What the depth camera sees, as grey, 640×488.
-    Infrared,
-    /// Nothing.
-    Off,
-}
-
-/// How to stream.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Default: eleven bits.
-    pub depth: DepthMode,
-    /// Default: colour.
-    pub video: VideoMode,
-    /// Give depth as the colour camera sees it, by the device's registration. Default false: depth as it was measured,
-    /// with the colour camera's place in the rig.
-    pub registered: bool,
-    /// Transfers in flight for each stream. Default 16.
-    pub transfers: usize,
-    /// Packets of each transfer. Default 32: 4 ms.
-    pub packets: usize,
-    /// How long a command may take. Default 0.5 s (Linux' gspca `kinect.c` gives as much).
-    pub command_limit: Duration,
-    /// After so long without a frame the streams are switched off and on once; after as long again that is an error.
-    /// Default 2 s.
-    pub frame_limit: Duration,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            depth: DepthMode::Eleven,
-            video: VideoMode::Color,
-            registered: false,
-            transfers: 16,
-            packets: 32,
-            command_limit: Duration::from_millis(500),
-            frame_limit: Duration::from_secs(2),
-        }
-    }
-}
-
-/// How well it went so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Health {
-    /// Losses of the depth stream.
-    pub depth: Losses,
-    /// Losses of the video stream.
-    pub video: Losses,
-    /// Frames given.
-    pub frames: u64,
-    /// Frames of which nothing could be given.
-    pub lost_frames: u64,
-    /// Frames given without colour, and without depth.
-    pub alone: [u64; 2],
-    /// How often the streams were switched off and on.
-    pub restarts: u32,
-}
 
 /// The Kinects on a bus, each with its serial number (empty where it cannot be told).
 ///
@@ -454,11 +378,6 @@ fn rig(info: &DeviceInfo, serial: String, registration: &Registration, settings:
         fps: FPS,
     };
     Rig { sensors: vec![sensor] }
-}
-
-fn host_now_ns() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 //! 3. [`decode`]: packed depth, infrared and Bayer colours to images, pure;
 //! 4. [`calibration`]: the device's own numbers; raw depth to millimetres; [`registration`]: depth as colour sees it;
 //! 5. [`toile_capture::pairing`]: depth and colour of one time to one frame;
-//! 6. [`device`]: [`Kinect1`], the [`toile_capture::Source`] over it all; [`motor`]: LED, tilt, accelerometer.
+//! 6. [`device`]: [`Kinect1`], the [`toile_capture::Source`] over it all, as [`settings`] say; [`health`]: how it went; [`motor`]: LED, tilt, accelerometer.
 //!
 //! Protocol facts were learnt from libfreenect (<https://github.com/OpenKinect/libfreenect>), the OpenKinect wiki and
 //! Linux' `drivers/media/usb/gspca/kinect.c`; each constant names its place.
@@ -32,12 +32,15 @@ mod commands;
 pub mod decode;
 pub mod device;
 pub mod error;
+pub mod health;
 pub mod motor;
-
 pub mod protocol;
 pub mod registration;
+pub mod settings;
 
 pub use calibration::Calibration;
-pub use device::{DepthMode, Health, Kinect1, Settings, VideoMode, list};
+pub use device::{Kinect1, list};
 pub use error::Kinect1Error;
+pub use health::Health;
 pub use motor::{Led, Motor, MotorState};
+pub use settings::{DepthMode, Settings, VideoMode};

@@ -5,8 +5,8 @@ mod common;
 
 use std::sync::{Arc, Mutex};
 
-use common::{has_color_of, has_depth_of, mm, plugged, settings, take};
-use toile_capture::{ClockDomain, ColorImage, Recorder, RecorderOptions, Replay, Source};
+use common::{has_color_of, has_depth_of, mm, plugged, settings};
+use toile_capture::{ClockDomain, ColorImage, Source};
 use toile_driver_kinect1::{DepthMode, Kinect1, Led, Motor, Settings, VideoMode};
 use toile_driver_models::kinect1::{CameraModel, Content, MotorModel, Optics, Pattern, Rendered};
 use toile_synthetic::{Subject, SyntheticSettings, sensor::SensorPreset};
@@ -67,27 +67,6 @@ fn infrared_comes_as_grey_beside_the_depth() {
         let truth = Pattern::default().infrared(k);
         assert!(image.pixels.iter().zip(truth).all(|(p, v)| *p == [(v >> 2) as u8; 3]));
     }
-}
-
-#[test]
-fn a_recorded_take_replayed_and_recorded_again_is_the_same() {
-    let (bus, ..) = plugged(CameraModel::new(Pattern::default()));
-    let mut kinect = Kinect1::open(&bus, None, settings()).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let record = |source: &mut dyn Source, name: &str, count: usize| {
-        let path = folder.path().join(name);
-        let mut recorder = Recorder::create(&path, source.rig(), RecorderOptions::default()).unwrap();
-        let (frames, _) = take(source, count);
-        frames.iter().for_each(|frame| recorder.write(frame).unwrap());
-        recorder.finish().unwrap();
-        (frames, path)
-    };
-    let (live, first) = record(&mut kinect, "first.mcap", 12);
-    let (replayed, second) = record(&mut Replay::open(&first).unwrap(), "second.mcap", 100);
-    let (again, _) = take(&mut Replay::open(&second).unwrap(), 100);
-    assert_eq!(live.len(), 12);
-    assert!(live == replayed && replayed == again);
-    assert_eq!(std::fs::read(first).unwrap(), std::fs::read(second).unwrap());
 }
 
 /// Of every depth pixel and distance: where the driver sees it in colour, and where the model's optics have it.

@@ -1,23 +1,21 @@
 //! The camera as a source of frames.
 
-use std::{
-    sync::Arc,
-    time::{Duration, SystemTime},
-};
+use std::{sync::Arc, time::Duration};
 
 use toile_capture::{
     CaptureError, ClockDomain, ClockFit, ColorImage, DepthImage, DeviceIdentity, Frame, Rig, Sensor, Source,
+    host_now_ns,
     pairing::{Pair, Pairing},
 };
 use toile_driver_transport::{Bus, DeviceInfo, LinkSpeed, Transfer, TransferStatus, TransportError, UsbDevice};
 use toile_geometry::Rigid;
 
 use crate::{
-    Calibration, Kinect2Error,
+    Calibration, ColorMode, Health, Kinect2Error, Settings,
     color::{self, unmirrored},
     color_stream::{ColorImageBytes, ColorStream},
     commands::{Commands, Identity},
-    decode::{COLUMNS, DecodeSettings, Decoder, ROWS},
+    decode::{COLUMNS, Decoder, ROWS},
     depth_stream::{DepthPacket, DepthStream},
     protocol::{COLOR_ENDPOINT, DEPTH_ENDPOINT, DEPTH_PACKET_ROOM},
     registration::Registration,
@@ -37,81 +35,9 @@ const MICROFRAMES: f64 = 8000.0;
 /// Bytes of a colour transfer (libfreenect2 `Freenect2DeviceImpl::open`).
 const COLOR_TRANSFER: usize = 0x4000;
 
-/// What comes with depth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum ColorMode {
-    /// The colour of each depth pixel, by the device's registration: 512×424.
-    #[default]
-    Registered,
-    /// The whole colour image, 1920×1080, with the colour camera's place in the rig. A take of it needs 190 MB/s of disk.
-    Full,
-    /// Nothing.
-    Off,
-}
-
-/// How to stream.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Default: registered.
-    pub color: ColorMode,
-    /// What depth is dropped.
-    pub decode: DecodeSettings,
-    /// Depth transfers in flight, of a millisecond each. Default 56: with colour's just below the 16 MB that Linux gives
-    /// USB programs.
-    pub transfers: usize,
-    /// How long a command may take. Default 1 s, as libfreenect2 gives.
-    pub command_limit: Duration,
-    /// How long the camera may take until it is ready. Default 5 s.
-    pub ready_limit: Duration,
-    /// After so long without a frame the streams are switched off and on once; after as long again that is an error.
-    /// Default 2 s.
-    pub frame_limit: Duration,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            color: ColorMode::Registered,
-            decode: DecodeSettings::default(),
-            transfers: 56,
-            command_limit: Duration::from_secs(1),
-            ready_limit: Duration::from_secs(5),
-            frame_limit: Duration::from_secs(2),
-        }
-    }
-}
-
 /// Colour transfers in flight (libfreenect2 `Freenect2DeviceImpl::open`), and packets of a depth transfer.
 const COLOR_TRANSFERS: usize = 20;
 const DEPTH_PACKETS: usize = 8;
-
-/// What a stream lost so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Losses {
-    /// Packets (depth) or transfers (colour) that the bus lost or damaged.
-    pub packets: u64,
-    /// Images that arrived but cannot be used: wrong length, wrong footer, not a JPEG, out of place.
-    pub bad: u64,
-    /// Frames that were begun and are not whole.
-    pub torn_frames: u64,
-}
-
-/// How well it went so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Health {
-    /// Losses of the depth stream.
-    pub depth: Losses,
-    /// Losses of the colour stream.
-    pub color: Losses,
-    /// Frames given.
-    pub frames: u64,
-    /// Frames of which nothing could be given.
-    pub lost_frames: u64,
-    /// Frames given without colour, and without depth.
-    pub alone: [u64; 2],
-    /// How often the streams were switched off and on.
-    pub restarts: u32,
-}
 
 /// The Kinects on a bus, each with its serial number (empty where it cannot be told).
 ///
@@ -461,11 +387,6 @@ fn advised(error: TransportError) -> Kinect2Error {
         }
         other => other.into(),
     }
-}
-
-fn host_now_ns() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

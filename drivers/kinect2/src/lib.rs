@@ -7,7 +7,7 @@
 //! 3. [`toile_capture::pairing`]: depth and colour of one time to one frame;
 //! 4. [`decode`]: ten images of measurements to depth in millimetres, pure; [`color`]: the JPEG to pixels;
 //! 5. [`calibration`]: the device's own numbers; [`registration`]: colour as depth sees it;
-//! 6. [`device`]: [`Kinect2`], the [`toile_capture::Source`] over it all.
+//! 6. [`device`]: [`Kinect2`], the [`toile_capture::Source`] over it all, as [`settings`] say; [`health`]: how it went.
 //!
 //! The sensor sees everything mirrored; what this crate gives is not. Protocol facts were learnt from libfreenect2
 //! (<https://github.com/OpenKinect/libfreenect2>); each constant names its place.
@@ -34,10 +34,14 @@ pub mod decode;
 pub mod depth_stream;
 pub mod device;
 pub mod error;
+pub mod health;
 pub mod protocol;
 pub mod registration;
+pub mod settings;
 
 pub use calibration::Calibration;
 pub use decode::{DecodeSettings, Decoded, Decoder};
-pub use device::{ColorMode, Health, Kinect2, Losses, Settings, list};
+pub use device::{Kinect2, list};
 pub use error::Kinect2Error;
+pub use health::{Health, Losses};
+pub use settings::{ColorMode, Settings};

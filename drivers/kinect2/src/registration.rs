@@ -18,6 +18,13 @@ use crate::{
 /// Units of the polynomials (libfreenect2 `depth_q`, `color_q`).
 const DEPTH_UNIT: f64 = 0.01;
 const COLOR_UNIT: f64 = 0.002199;
+/// What is nearer to the colour camera is kept in cells of so many of its columns and rows: about a depth pixel.
+const CELL: usize = 3;
+const CELLS: [usize; 2] = [COLOR_COLUMNS.div_ceil(CELL), COLOR_ROWS.div_ceil(CELL)];
+/// A pixel is hidden where something is nearer by this share of its depth; pixels nearer together are of one surface.
+const BEHIND: f32 = 0.03;
+/// The colour of a hidden pixel is looked for so many pixels aside.
+const ASIDE: usize = 24;
 /// Pixels without depth get the colour that they would have at this distance, millimetres.
 const NO_DEPTH_MM: f32 = 2000.0;
 
@@ -54,16 +61,40 @@ impl Registration {
     }
 
     /// The colour of each depth pixel, of mirrored colours as [`crate::color::decode`] gives them: mixed of the four
-    /// pixels around its place; black where the colour camera does not look. Depth is in millimetres, 0 where there is
-    /// none.
+    /// pixels around its place; black where the colour camera does not look. A pixel that something nearer hides from
+    /// the colour camera gets the colour of the next one in its row that is of the same surface and seen. Depth is in
+    /// millimetres, 0 where there is none.
     pub fn register(&self, depth_mm: &[f32], mirrored: &[[u8; 3]]) -> RgbImage {
-        let seen = |(&mm, far): (&f32, &[f32; 2])| {
+        let nearest = self.nearest(depth_mm);
+        let place = |(&mm, far): (&f32, &[f32; 2])| {
             let mm = if mm > 0.0 { mm } else { NO_DEPTH_MM };
-            let [x, y] = [far[0] - self.shift / mm, far[1]];
-            mixed(mirrored, (COLOR_COLUMNS - 1) as f32 - x, y)
+            [far[0] - self.shift / mm, far[1]]
         };
-        let pixels = depth_mm.iter().zip(&self.far).map(seen).collect();
+        let places: Vec<[f32; 2]> = depth_mm.iter().zip(&self.far).map(place).collect();
+        let is_hidden = |(&mm, at): (&f32, &[f32; 2])| cell(*at).is_some_and(|i| nearest[i] < mm * (1.0 - BEHIND));
+        let hidden: Vec<bool> = depth_mm.iter().zip(&places).map(is_hidden).collect();
+        let seen = |[x, y]: &[f32; 2]| mixed(mirrored, (COLOR_COLUMNS - 1) as f32 - x, *y);
+        let mut pixels: Vec<[u8; 3]> = places.iter().map(seen).collect();
+        for i in (0..pixels.len()).filter(|i| hidden[*i]) {
+            pixels[i] = beside(i, depth_mm, &hidden).map_or([0; 3], |j| pixels[j]);
+        }
         RgbImage { width: COLUMNS as u32, height: ROWS as u32, pixels }
+    }
+
+    /// The least depth in each cell of the colour image, millimetres: every pixel covers the cells that it touches.
+    fn nearest(&self, depth_mm: &[f32]) -> Vec<f32> {
+        let mut nearest = vec![f32::INFINITY; CELLS[0] * CELLS[1]];
+        // Half a depth pixel, and as far as pixels are mixed.
+        let half = 0.5 * CELL as f32 + 1.0;
+        for (&mm, far) in depth_mm.iter().zip(&self.far).filter(|(mm, _)| **mm > 0.0) {
+            let [x, y] = [far[0] - self.shift / mm, far[1]];
+            for (x, y) in [x - half, x, x + half].into_iter().flat_map(|x| [(x, y - half), (x, y), (x, y + half)]) {
+                if let Some(i) = cell([x, y]) {
+                    nearest[i] = nearest[i].min(mm);
+                }
+            }
+        }
+        nearest
     }
 
     /// The colour camera that fits the tables best (least squares over all pixels, without distortion), and where the
@@ -86,6 +117,22 @@ impl Registration {
 fn polynomial(p: &[f64; 10], [x, y]: [f64; 2]) -> f64 {
     let terms = [x * x * x, y * y * y, x * x * y, x * y * y, x * x, y * y, x * y, x, y, 1.0];
     p.iter().zip(terms).map(|(p, t)| p * t).sum()
+}
+
+/// The cell of a place in the colour image; `None` outside.
+#[inline]
+fn cell([x, y]: [f32; 2]) -> Option<usize> {
+    // NaN is not within.
+    let inside = x >= 0.0 && y >= 0.0 && x < COLOR_COLUMNS as f32 && y < COLOR_ROWS as f32;
+    inside.then(|| y as usize / CELL * CELLS[0] + x as usize / CELL)
+}
+
+/// The nearest pixel in the same row that is of the same surface and not hidden.
+fn beside(i: usize, depth_mm: &[f32], hidden: &[bool]) -> Option<usize> {
+    let row = i - i % COLUMNS..i - i % COLUMNS + COLUMNS;
+    let sides = (1..=ASIDE).flat_map(|k| [i.wrapping_sub(k), i + k]);
+    let like = |j: &usize| !hidden[*j] && (depth_mm[*j] - depth_mm[i]).abs() < BEHIND * depth_mm[i];
+    sides.filter(|j| row.contains(j)).find(like)
 }
 
 /// Mix of the four pixels around a place; black outside.

@@ -8,6 +8,7 @@
 //! - [`kinect2`]: the second Kinect;
 //! - [`d435`]: the RealSense D435: depth, infrared pair, colour, its monitor and its calibration;
 //! - [`uvc`]: UVC cameras of any shape; [`side_by_side`]: a stereo camera among them;
+//! - [`trials`]: what any camera must stand (unplugs, long takes, replay), for the tests of the drivers;
 //! - [`descriptors`]: standard requests, for kernels; [`usbip`]: a model behind USB/IP; [`vhci`]: plugged into a kernel;
 //!   [`proof`]: what is proven there.
 //!
@@ -26,6 +27,7 @@ pub mod kinect1;
 pub mod kinect2;
 pub mod proof;
 pub mod side_by_side;
+pub mod trials;
 pub mod usbip;
 pub mod uvc;
 pub mod vhci;

@@ -1,13 +1,9 @@
 //! The camera as a source of frames.
 
-use std::{
-    collections::VecDeque,
-    sync::Arc,
-    time::{Duration, SystemTime},
-};
+use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use toile_capture::{
-    CaptureError, ClockDomain, ClockFit, ColorImage, DepthImage, Frame, RgbImage, Rig, Source,
+    CaptureError, ClockDomain, ClockFit, ColorImage, DepthImage, Frame, RgbImage, Rig, Source, host_now_ns,
     pairing::{Pair, Pairing},
 };
 use toile_driver_transport::{
@@ -16,76 +12,11 @@ use toile_driver_transport::{
 };
 
 use crate::{
-    Calibration, Camera, Controls, RealsenseError, decode, find, monitor,
+    Calibration, Camera, Controls, Health, RealsenseError, Settings, VideoMode, decode, find, monitor,
     monitor::Details,
     rig::rig,
     stream::{Shot, Stream},
 };
-
-/// What comes beside depth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum VideoMode {
-    /// Colour.
-    #[default]
-    Color,
-    /// The infrared pair as grey: left, which sees what depth sees, beside the depth; right as a sensor of its own.
-    Infrared,
-    /// Nothing.
-    Off,
-}
-
-/// How to stream.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
-    /// Default: colour.
-    pub video: VideoMode,
-    /// Columns and rows of depth and infrared. Default 640×480, which every model has over USB 2 and 3.
-    pub size: (u32, u32),
-    /// Columns and rows of colour. Default 640×480.
-    pub color_size: (u32, u32),
-    /// Frames a second of all streams. Default 30.
-    pub fps: u32,
-    /// Laser, exposure and preset; default: as the camera has them.
-    pub controls: Controls,
-    /// Buffers of each stream that the kernel may fill ahead of us. Default 8: a quarter of a second.
-    pub buffers: u32,
-    /// After so long without a frame the streams are switched off and on once; after as long again that is an error.
-    /// Default 3 s: exposure settles before the first frame.
-    pub frame_limit: Duration,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            video: VideoMode::Color,
-            size: (640, 480),
-            color_size: (640, 480),
-            fps: 30,
-            controls: Controls::default(),
-            buffers: 8,
-            frame_limit: Duration::from_secs(3),
-        }
-    }
-}
-
-/// How well it went so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Health {
-    /// Frames given.
-    pub frames: u64,
-    /// Frames of which nothing could be given.
-    pub lost_frames: u64,
-    /// Depth and colour (or infrared) pictures that the kernel lost, or kept to itself because they were damaged.
-    pub lost_pictures: [u64; 2],
-    /// Frames given without colour, and without depth.
-    pub alone: [u64; 2],
-    /// Pictures that came and could not be read.
-    pub broken: u64,
-    /// Pictures that came without the camera's time, which are lost while it tells that of others.
-    pub without_time: u64,
-    /// How often the streams were switched off and on.
-    pub restarts: u32,
-}
 
 /// How long one stream is waited for before the other is looked at.
 const TURN: Duration = Duration::from_millis(5);
@@ -126,8 +57,12 @@ impl Realsense {
     ///
     /// # Errors
     /// [`RealsenseError`] where there is none, it may not be opened, or its firmware does not answer as it should.
-    pub fn open(video: &dyn Video, serial: Option<&str>, settings: Settings) -> Result<Self, RealsenseError> {
+    pub fn open(video: &dyn Video, serial: Option<&str>, mut settings: Settings) -> Result<Self, RealsenseError> {
         let (camera, details) = choose(video, serial)?;
+        if settings.video == VideoMode::Color && !camera.has_color_part() {
+            tracing::info!("{} has no colour camera; it gives depth alone", camera.name);
+            settings.video = VideoMode::Off;
+        }
         let (width, height) = settings.size;
         let size = (width, height, settings.fps);
         let depth = camera.depth.as_ref().ok_or(RealsenseError::NoNode("depth"))?;
@@ -429,11 +364,6 @@ impl Clock {
         self.last = Some((told, kernel_ns, time));
         time
     }
-}
-
-fn host_now_ns() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

@@ -11,6 +11,10 @@ use toile_driver_transport::{
 
 use crate::RealsenseError;
 
+/// Products without a camera part for colour: `rs400_device`, `rs410_device` and `rs405_device` of librealsense
+/// `src/ds/d400/d400-factory.cpp` (the D405 can send colour in the place of infrared, which is not asked for here).
+const WITHOUT_COLOR: [u16; 3] = [0x0ad1, 0x0ad2, 0x0b5b];
+
 /// A node for pictures and the one that carries their metadata, where the kernel has one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Nodes {
@@ -39,6 +43,13 @@ pub struct Camera {
     pub infrared: Option<Nodes>,
     /// Colour (YUYV), of another camera part than depth.
     pub color: Option<Nodes>,
+}
+
+impl Camera {
+    /// True where such cameras have a part for colour.
+    pub fn has_color_part(&self) -> bool {
+        !WITHOUT_COLOR.contains(&self.id.1)
+    }
 }
 
 /// The cameras that are plugged in, in the order of their first nodes. Nodes that cannot be opened are left out.

@@ -7,7 +7,7 @@
 //! 3. [`controls`]: laser, exposure, preset;
 //! 4. [`metadata`]: payload headers to device time and frame number, pure; [`stream`]: pictures with their metadata;
 //! 5. [`decode`]: buffers to images, pure; [`toile_capture::pairing`]: depth and colour of one time to one frame;
-//! 6. [`device`]: [`Realsense`], the [`toile_capture::Source`] over it all.
+//! 6. [`device`]: [`Realsense`], the [`toile_capture::Source`] over it all, as [`settings`] say; [`health`]: how it went.
 //!
 //! Facts were learnt from librealsense (<https://github.com/IntelRealSense/librealsense>) and Linux' `uvcvideo`; each
 //! constant names its place.
@@ -34,13 +34,17 @@ pub mod decode;
 pub mod device;
 pub mod error;
 pub mod find;
+pub mod health;
 pub mod metadata;
 pub mod monitor;
 mod rig;
+pub mod settings;
 pub mod stream;
 
 pub use calibration::Calibration;
 pub use controls::{Controls, Exposure};
-pub use device::{Health, Realsense, Settings, VideoMode};
+pub use device::Realsense;
 pub use error::RealsenseError;
 pub use find::{Camera, list};
+pub use health::Health;
+pub use settings::{Settings, VideoMode};

@@ -5,8 +5,10 @@ use toile_geometry::Rigid;
 
 use crate::{Calibration, Camera, RealsenseError, Settings, VideoMode, monitor::Details};
 
-/// Metres a depth unit: the factory's setting (`d400_device.cpp`: 0.001, of the D405 0.0001, which is not driven here).
+/// Metres a depth unit: the factory's setting, and that of the D405 (librealsense `src/ds/d400/d400-device.cpp`).
 const DEPTH_SCALE: f64 = 0.001;
+const D405: u16 = 0x0b5b;
+const D405_DEPTH_SCALE: f64 = 0.0001;
 
 /// Depth with colour, or depth with left infrared and then right infrared as a sensor of its own.
 pub(crate) fn rig(
@@ -36,7 +38,7 @@ pub(crate) fn rig(
         name: name.clone(),
         identity,
         depth,
-        depth_scale: DEPTH_SCALE,
+        depth_scale: if camera.id.1 == D405 { D405_DEPTH_SCALE } else { DEPTH_SCALE },
         color,
         color_from_depth,
         rig_from_depth: Rigid::identity(),

@@ -3,16 +3,15 @@
 
 mod common;
 
-use common::{SIZE, has_color_of, has_depth_of, pattern, plugged, settings, take};
+use common::{SIZE, has_color_of, has_depth_of, pattern, plugged, settings};
 use nalgebra::Point3;
-use toile_capture::{ClockDomain, ColorImage, Recorder, RecorderOptions, Replay, Source};
+use toile_capture::{ClockDomain, ColorImage, Source};
 use toile_driver_models::{
     d435::{self, Content, Optics, Pattern, Rendered},
     uvc::Wire,
 };
 use toile_driver_realsense::{Controls, Exposure, Realsense, Settings, VideoMode, list};
 use toile_driver_transport::video::twin::VirtualVideo;
-
 use toile_synthetic::{Subject, SyntheticSettings, sensor::SensorPreset};
 
 #[test]
@@ -106,6 +105,22 @@ fn the_infrared_pair_comes_beside_depth_and_as_a_sensor_of_its_own() {
     }
 }
 
+/// The D405 has no colour part and depth in tenths of a millimetre.
+#[test]
+fn a_camera_without_colour_gives_depth_alone_in_its_own_unit() {
+    let (bus, ..) = plugged(d435::d405(Pattern::default(), Wire::Isochronous));
+    let video = VirtualVideo::new(bus);
+    let found = &list(&video).unwrap()[0];
+    assert_eq!((found.name, found.has_color_part(), found.color.is_some()), ("RealSense D405", false, false));
+    let mut camera = Realsense::open(&video, None, settings()).unwrap();
+    let sensor = camera.rig().sensors[0].clone();
+    assert_eq!((sensor.depth_scale, sensor.color, sensor.identity.model.as_str()), (1e-4, None, "RealSense D405"));
+    for k in 0..5 {
+        let frame = camera.next_frame().unwrap().unwrap();
+        assert!(has_depth_of(&frame, k) && frame.color.is_none());
+    }
+}
+
 #[test]
 fn controls_are_set_and_read() {
     let (bus, _, model) = plugged(pattern(Wire::Bulk));
@@ -143,48 +158,4 @@ fn a_rendered_person_arrives_as_rendered() {
         let worst = image.pixels.iter().zip(&color).step_by(2).map(|(a, b)| (grey(a) - grey(b)).abs());
         assert!(worst.fold(0.0, f64::max) < 3.0);
     }
-}
-
-#[test]
-fn a_recorded_take_replayed_and_recorded_again_is_the_same() {
-    let (bus, ..) = plugged(pattern(Wire::Isochronous));
-    let mut camera = Realsense::open(&VirtualVideo::new(bus), None, settings()).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let record = |source: &mut dyn Source, name: &str, count: usize| {
-        let path = folder.path().join(name);
-        let mut recorder = Recorder::create(&path, source.rig(), RecorderOptions::default()).unwrap();
-        let (frames, _) = take(source, count);
-        frames.iter().for_each(|frame| recorder.write(frame).unwrap());
-        recorder.finish().unwrap();
-        (path, frames)
-    };
-    let (first, frames) = record(&mut camera, "first.mcap", 5);
-    let (second, again) = record(&mut Replay::open(&first).unwrap(), "second.mcap", 9);
-    assert_eq!(frames.len(), 5);
-    assert!(frames == again);
-    let mut replay = Replay::open(&second).unwrap();
-    assert_eq!(replay.rig(), camera.rig());
-    assert!(take(&mut replay, 9).0 == frames);
-}
-
-#[test]
-fn ten_thousand_frames_leave_memory_flat() {
-    let (bus, ..) = plugged(pattern(Wire::Bulk));
-    let small = Settings { video: VideoMode::Off, size: (424, 240), ..settings() };
-    let mut camera = Realsense::open(&VirtualVideo::new(bus), None, small).unwrap();
-    let mut before = 0;
-    for k in 0..10_000u64 {
-        assert_eq!(camera.next_frame().unwrap().unwrap().device_frame, k);
-        if k == 1000 {
-            before = resident_kb();
-        }
-    }
-    // Other tests of this program run beside; a leak of a tenth of a picture a frame would be 180 MB.
-    assert!(resident_kb() < before + 60_000, "{} kB, before {before} kB", resident_kb());
-}
-
-fn resident_kb() -> u64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find(|l| l.starts_with("VmRSS:")).unwrap_or_default();
-    line.split_whitespace().nth(1).and_then(|n| n.parse().ok()).unwrap_or(0)
 }

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use serde::{Deserialize, Serialize};
-use toile_capture::{CaptureError, ColorImage, DeviceIdentity, Frame, Rig, Sensor, Source};
+use toile_capture::{CaptureError, ClockDomain, ColorImage, DeviceIdentity, Frame, Rig, Sensor, Source};
 use toile_driver_transport::video::Video;
 use toile_geometry::Rigid;
 use toile_stereo::{DepthFromPair, DepthSettings, StereoCalibration, read_calibration, rectify};
@@ -112,7 +112,12 @@ impl StereoCamera {
                 fps,
             )),
         };
-        Self::new(pairs, &calibration, settings)
+        let mut rig = Self::new(pairs, &calibration, settings)?;
+        if !matches!(settings.cameras, Cameras::Folder { .. }) {
+            // Video nodes stamp pictures by the kernel's clock.
+            rig.rig.sensors[0].identity.clock = ClockDomain::HostMonotonic;
+        }
+        Ok(rig)
     }
 
     /// A rig over any source of pairs; of the settings, `cameras`, `calibration` and `metres_per_unit` are not looked at.

@@ -56,12 +56,14 @@ pub struct TwoCameras<L: Pictures, R: Pictures> {
     right: R,
     pairer: Pairer,
     ended: [bool; 2],
+    /// What ended a camera, to be told after the pairs that came.
+    failed: Option<StereoDriverError>,
 }
 
 impl<L: Pictures, R: Pictures> TwoCameras<L, R> {
     /// Pairs two cameras that take `fps` pictures a second.
     pub fn new(left: L, right: R, fps: f64) -> Self {
-        Self { left, right, pairer: Pairer::new(period_ns(fps)), ended: [false; 2] }
+        Self { left, right, pairer: Pairer::new(period_ns(fps)), ended: [false; 2], failed: None }
     }
 }
 
@@ -84,18 +86,20 @@ impl<L: Pictures, R: Pictures> Pairs for TwoCameras<L, R> {
                 }
             };
             if is_over {
-                return Ok(None);
+                return self.failed.take().map_or(Ok(None), Err);
             }
             let side = self.pairer.wants();
             let next = match side {
                 Side::Left => self.left.next_picture(),
                 Side::Right => self.right.next_picture(),
             };
-            match next? {
-                Some(picture) => self.pairer.push(side, picture),
-                None => {
+            match next {
+                Ok(Some(picture)) => self.pairer.push(side, picture),
+                Err(torn @ StereoDriverError::Picture { .. }) => return Err(torn),
+                ended => {
                     self.pairer.end(side);
                     self.ended[side as usize] = true;
+                    self.failed = self.failed.take().or(ended.err());
                 }
             }
         }

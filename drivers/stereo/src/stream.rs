@@ -3,13 +3,11 @@
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
-    time::{Duration, SystemTime},
+    time::Duration,
 };
 
-use toile_driver_transport::{
-    TransportError,
-    video::{FourCc, Video, VideoNode},
-};
+use toile_capture::host_now_ns;
+use toile_driver_transport::video::{FourCc, Video, VideoNode};
 
 use crate::{
     StereoDriverError,
@@ -19,10 +17,10 @@ use crate::{
 
 /// Whatever yields the pictures of one camera in the order of time.
 pub trait Pictures: Send {
-    /// The next picture; `None` when the camera is gone or the recording is over.
+    /// The next picture; `None` when the recording is over.
     ///
     /// # Errors
-    /// [`StereoDriverError`]; after [`StereoDriverError::Picture`] the next call may go on.
+    /// [`StereoDriverError::Picture`], after which the next call may go on; any other ends the camera (unplugged).
     fn next_picture(&mut self) -> Result<Option<Picture>, StereoDriverError>;
 
     /// True for cameras: when one of a rig is gone, the other's pictures are of no more use.
@@ -79,28 +77,19 @@ impl NodePictures {
 
 impl Pictures for NodePictures {
     fn next_picture(&mut self) -> Result<Option<Picture>, StereoDriverError> {
-        let buffer = match self.node.next_buffer(TIMEOUT) {
-            // An unplugged camera ends the take; it does not fail it.
-            Err(TransportError::Unplugged) => return Ok(None),
-            other => other?,
-        };
+        let buffer = self.node.next_buffer(TIMEOUT)?;
         let sequence = u64::from(buffer.sequence);
         let image = decode::picture(&buffer.bytes, self.layout).map_err(|reason| StereoDriverError::Picture {
             side: self.side,
             sequence,
             reason,
         })?;
-        Ok(Some(Picture { image: Arc::new(image), sequence, time_ns: buffer.time_ns, host_time_ns: host_time_ns() }))
+        Ok(Some(Picture { image: Arc::new(image), sequence, time_ns: buffer.time_ns, host_time_ns: host_now_ns() }))
     }
 
     fn is_live(&self) -> bool {
         true
     }
-}
-
-fn host_time_ns() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 /// A sequence of picture files: `left01.png`, `left02.png`, ... The number in a name is the picture's number, and its time

@@ -11,16 +11,17 @@ use toile_driver_stereo::{
     Cameras, PairCounts, Pairs, Picture, Pictures, Side, SideBySide, StereoCamera, StereoDriverError, StereoSettings,
     TwoCameras, TwoSensors,
 };
-use toile_driver_transport::{twin::VirtualBus, video::twin::VirtualVideo};
+use toile_driver_transport::{TransportError, twin::VirtualBus, video::twin::VirtualVideo};
 use toile_stereo::DepthSettings;
 
 /// Nanoseconds a frame.
 const PERIOD: i64 = 33_000_000;
 
-/// What a scripted camera gives next: the picture with this number, or a torn one.
+/// What a scripted camera gives next: the picture with this number, a torn one, or nothing any more.
 enum Event {
     Picture(u64),
     Torn(u64),
+    Unplugged,
 }
 
 /// A camera in memory: its pictures come at `sequence` periods, `late` behind.
@@ -36,6 +37,7 @@ impl Pictures for Script {
     fn next_picture(&mut self) -> Result<Option<Picture>, StereoDriverError> {
         Ok(match self.events.pop_front() {
             None => None,
+            Some(Event::Unplugged) => return Err(TransportError::Unplugged.into()),
             Some(Event::Torn(sequence)) => {
                 let reason = "is torn".to_string();
                 return Err(StereoDriverError::Picture { side: self.side, sequence, reason });
@@ -172,8 +174,12 @@ fn a_torn_picture_and_one_of_another_size_are_named_and_the_next_pair_goes_on() 
 
 #[test]
 fn an_unplugged_camera_ends_the_take() {
-    let mut rig = camera(two(&[0, 1], &[0, 1, 2, 3, 4, 5, 6, 7]));
-    assert_eq!(all(&mut rig).len(), 2);
+    let (l, r) = scene::pictures();
+    let (mut left, right) = (script(Side::Left, l, &[0, 1]), script(Side::Right, r, &[0, 1, 2, 3, 4, 5, 6, 7]));
+    left.events.push_back(Event::Unplugged);
+    let mut rig = camera(TwoCameras::new(left, right, settings().fps));
+    assert!((0..2).all(|_| rig.next_frame().unwrap().is_some()));
+    assert!(rig.next_frame().unwrap_err().to_string().contains("unplugged"));
     assert!(rig.next_frame().unwrap().is_none());
 }
 

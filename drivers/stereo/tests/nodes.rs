@@ -121,6 +121,45 @@ fn damaged_pictures_are_lost_ones_and_their_neighbours_are_whole() {
 }
 
 #[test]
+fn bytes_too_many_and_headers_that_cannot_be_cost_their_picture_only() {
+    for (wire, what, packet) in [
+        // Room at the end of the last packet, so that the surplus comes in one payload.
+        (Wire::Isochronous, StreamFault::Long(60), 156),
+        (Wire::Isochronous, StreamFault::HeaderLength(0), 4),
+        (Wire::Isochronous, StreamFault::HeaderLength(250), 4),
+        (Wire::Bulk, StreamFault::ErrorBit, 0),
+        (Wire::Bulk, StreamFault::Torn, 3),
+        (Wire::Bulk, StreamFault::Lost(1), 3),
+    ] {
+        let mut pictures = pictures(&video(wire, &[fault(2, packet, what)]));
+        let told = numbers(&mut pictures, 4);
+        assert_eq!(told, [0, 1, 3, 4], "{wire:?} {what:?}");
+    }
+    // Pictures are told apart by one bit: one that is lost whole takes the next with it.
+    let mut pictures = pictures(&video(Wire::Isochronous, &[fault(2, 0, StreamFault::Lost(usize::MAX))]));
+    let told = numbers(&mut pictures, 4);
+    assert!(told.starts_with(&[0, 1]) && told.is_sorted() && !told.contains(&2), "{told:?}");
+}
+
+#[test]
+fn a_stream_that_is_refused_ends_the_take_in_words() {
+    let mut camera = rig(pictures(&video(Wire::Bulk, &[fault(2, 5, StreamFault::Stall)])));
+    assert!((0..2).all(|_| camera.next_frame().unwrap().is_some()));
+    let error = camera.next_frame().unwrap_err().to_string();
+    assert!(error.contains("no answer") || error.contains("refused"), "{error}");
+    assert!(camera.next_frame().unwrap().is_none());
+}
+
+#[test]
+fn a_size_that_the_camera_has_not_is_told() {
+    let video = video(Wire::Bulk, &[]);
+    let node = nodes::list(&video)[0].node.clone();
+    let opened = NodePictures::open(&video, &node, Side::Left, (1000, 300));
+    let error = opened.err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(error.contains("800") && error.contains("1000"), "{error}");
+}
+
+#[test]
 fn a_silent_camera_is_told_and_then_the_take_ends() {
     let mut camera = rig(pictures(&video(Wire::Isochronous, &[fault(2, 5, StreamFault::Silent)])));
     assert!((0..2).all(|_| camera.next_frame().unwrap().is_some()));
@@ -132,6 +171,10 @@ fn a_silent_camera_is_told_and_then_the_take_ends() {
 #[test]
 fn an_unplug_ends_the_take_after_all_whole_pictures() {
     let mut pictures = pictures(&video(Wire::Bulk, &[fault(3, 4, StreamFault::Unplug)]));
-    assert_eq!(numbers(&mut pictures, 9), [0, 1, 2]);
-    assert!(pictures.next_picture().unwrap().is_none());
+    assert_eq!(numbers(&mut pictures, 3), [0, 1, 2]);
+    assert!(pictures.next_picture().unwrap_err().to_string().contains("unplugged"));
+    let mut camera = rig(self::pictures(&video(Wire::Bulk, &[fault(3, 4, StreamFault::Unplug)])));
+    assert!((0..3).all(|_| camera.next_frame().unwrap().is_some()));
+    assert!(camera.next_frame().unwrap_err().to_string().contains("unplugged"));
+    assert!(camera.next_frame().unwrap().is_none());
 }

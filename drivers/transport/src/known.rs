@@ -47,6 +47,7 @@ pub const KNOWN: &[Known] = &[
     known(0x8086, 0x0ad3, "RealSense D415", Family::Realsense, false),
     known(0x8086, 0x0b07, "RealSense D435", Family::Realsense, false),
     known(0x8086, 0x0b3a, "RealSense D435i", Family::Realsense, false),
+    known(0x8086, 0x0b5b, "RealSense D405", Family::Realsense, false),
     known(0x8086, 0x0b5c, "RealSense D455", Family::Realsense, false),
 ];
 

@@ -57,6 +57,27 @@ mod tests {
     }
 
     #[test]
+    fn the_installed_file_is_the_rule_and_a_refusal_prints_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = install(folder.path()).unwrap();
+        assert_eq!(
+            (path.file_name().unwrap().to_str(), std::fs::read_to_string(&path).unwrap()),
+            (Some(RULE_FILE), rules())
+        );
+        let device = crate::DeviceInfo {
+            vendor: 0x045e,
+            product: 0x02ae,
+            release: 0,
+            address: (1, 7),
+            hub: Vec::new(),
+            speed: crate::LinkSpeed::High,
+        };
+        let words = TransportError::NoPermission { device }.to_string();
+        assert!(words.contains("no permission") && words.contains("toile devices --install-udev-rules"), "{words}");
+        assert!(words.contains(rule(0x045e).trim_end()) && words.contains(RULES_FOLDER), "{words}");
+    }
+
+    #[test]
     fn a_folder_that_is_not_there_is_named() {
         let error = install(Path::new("no/such/folder")).unwrap_err().to_string();
         assert!(error.contains("no/such/folder") && error.contains("root"), "{error}");

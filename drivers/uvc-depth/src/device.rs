@@ -1,12 +1,8 @@
 //! The camera as a source of frames.
 
-use std::{
-    path::Path,
-    sync::Arc,
-    time::{Duration, SystemTime},
-};
+use std::{path::Path, sync::Arc, time::Duration};
 
-use toile_capture::{CaptureError, Frame, Rig, Source};
+use toile_capture::{CaptureError, Frame, Rig, Source, host_now_ns};
 use toile_driver_transport::{
     TransportError,
     video::{Video, VideoBuffer, VideoNode},
@@ -135,7 +131,7 @@ impl UvcDepthCamera {
             device_frame: u64::from(buffer.sequence),
             lost_before: lost,
             device_time_ns: buffer.time_ns,
-            host_time_ns: host_time_ns(),
+            host_time_ns: host_now_ns(),
             depth: Some(Arc::new(depth)),
             color: None,
         })
@@ -161,9 +157,4 @@ impl Source for UvcDepthCamera {
         })?;
         Ok(Some(frame))
     }
-}
-
-fn host_time_ns() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }

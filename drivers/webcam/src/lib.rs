@@ -9,14 +9,12 @@
 
 pub mod convert;
 
-use std::time::SystemTime;
-
 use nokhwa::{
     Buffer, Camera,
     pixel_format::RgbFormat,
     utils::{ApiBackend, CameraIndex, FrameFormat, RequestedFormat, RequestedFormatType},
 };
-use toile_capture::{CaptureError, ClockDomain, DeviceIdentity, Frame, Rig, Sensor, Source};
+use toile_capture::{CaptureError, ClockDomain, DeviceIdentity, Frame, Rig, Sensor, Source, host_now_ns};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 /// Horizontal field of view assumed for an uncalibrated webcam, radians (60°, the usual for laptop cameras).
@@ -67,7 +65,7 @@ impl Webcam {
     }
 
     fn frame(&self, buffer: &Buffer) -> Result<Frame, WebcamError> {
-        let now = host_time_ns();
+        let now = host_now_ns();
         let size = buffer.resolution();
         let color = match buffer.source_frame_format() {
             FrameFormat::MJPEG => convert::jpeg(buffer.buffer())?,
@@ -118,11 +116,6 @@ fn sensor(name: &str, width: u32, height: u32, fps: u32) -> Sensor {
         rig_from_depth: Rigid::identity(),
         fps: f64::from(fps),
     }
-}
-
-fn host_time_ns() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use toile_capture::{CaptureError, ColorImage, Frame, Source};
+use toile_capture::{ColorImage, Frame};
 use toile_driver_kinect1::{Kinect1, Settings};
 use toile_driver_models::kinect1::{CameraModel, Content, Fault, Pattern, Stream, StreamFault};
 use toile_driver_transport::{DeviceInfo, twin::VirtualBus};
@@ -39,19 +39,6 @@ pub fn depth_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {
 
 pub fn video_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {
     Fault { stream: Stream::Video, frame, packet, what }
-}
-
-/// Frames until there are `count`, or the end, or an error.
-pub fn take(source: &mut dyn Source, count: usize) -> (Vec<Frame>, Option<CaptureError>) {
-    let mut frames = Vec::new();
-    while frames.len() < count {
-        match source.next_frame() {
-            Ok(Some(frame)) => frames.push(frame),
-            Ok(None) => break,
-            Err(error) => return (frames, Some(error)),
-        }
-    }
-    (frames, None)
 }
 
 /// Millimetres of a raw value: z = 10·r·e / (e − m), m = (raw / 4 − 200 − 0.375)·p (the model's optics, spelt out).

@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use toile_capture::{CaptureError, ColorImage, Frame, Source};
+use toile_capture::{ColorImage, Frame};
 use toile_driver_kinect2::{ColorMode, DecodeSettings, Decoder, Kinect2, Settings, color};
 use toile_driver_models::kinect2::{CameraModel, Content, Fault, Pattern, Stream, StreamFault};
 use toile_driver_transport::{DeviceInfo, twin::VirtualBus};
@@ -50,19 +50,6 @@ pub fn depth_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {
 
 pub fn color_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {
     Fault { stream: Stream::Color, frame, packet, what }
-}
-
-/// Frames until there are `count`, or the end, or an error.
-pub fn take(source: &mut dyn Source, count: usize) -> (Vec<Frame>, Option<CaptureError>) {
-    let mut frames = Vec::new();
-    while frames.len() < count {
-        match source.next_frame() {
-            Ok(Some(frame)) => frames.push(frame),
-            Ok(None) => break,
-            Err(error) => return (frames, Some(error)),
-        }
-    }
-    (frames, None)
 }
 
 /// What frame `number` must give.

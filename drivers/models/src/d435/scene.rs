@@ -27,6 +27,20 @@ pub struct D435 {
 
 /// A D435 before some content.
 pub fn model(content: impl Content + 'static, wire: Wire) -> UvcModel<D435> {
+    UvcModel::new(shape(wire), D435::new(content))
+}
+
+/// A D405 before some content: the depth part alone.
+pub fn d405(content: impl Content + 'static, wire: Wire) -> UvcModel<D435> {
+    let mut shape = shape(wire);
+    shape.ids[1] = 0x0b5b;
+    shape.strings[0] = "Intel(R) RealSense(TM) Depth Camera 405".into();
+    shape.strings[1] = shape.strings[0].clone();
+    shape.functions.truncate(1);
+    UvcModel::new(shape, D435::new(content))
+}
+
+fn shape(wire: Wire) -> Shape {
     let format = |code, bits| FormatShape { code, bits, sizes: SIZES.into(), rates: RATES.into() };
     let stream = |endpoint, formats: &[([u8; 4], u8)]| StreamShape {
         endpoint,
@@ -37,7 +51,7 @@ pub fn model(content: impl Content + 'static, wire: Wire) -> UvcModel<D435> {
         extension: Some(ExtensionShape { unit: 3, guid: EXTENSION, selectors: 17 }),
     };
     let color = FunctionShape { streams: vec![stream(0x84, &[(*b"YUY2", 16)])], extension: None };
-    let shape = Shape {
+    Shape {
         ids: [0x8086, 0x0b07, 0x50c7],
         strings: [
             "Intel(R) RealSense(TM) Depth Camera 435".into(),
@@ -46,12 +60,15 @@ pub fn model(content: impl Content + 'static, wire: Wire) -> UvcModel<D435> {
         ],
         functions: vec![depth, color],
         wire,
-    };
-    let monitor = Monitor::new(content.optics());
-    UvcModel::new(shape, D435 { content: Box::new(content), monitor })
+    }
 }
 
 impl D435 {
+    fn new(content: impl Content + 'static) -> Self {
+        let monitor = Monitor::new(content.optics());
+        Self { content: Box::new(content), monitor }
+    }
+
     /// What it sees.
     pub fn content(&mut self) -> &mut dyn Content {
         &mut *self.content

@@ -57,6 +57,40 @@ impl Content for Pattern {
     }
 }
 
+/// The first frame of other content again and again, computed once: for takes of thousands of frames.
+#[derive(Debug, Clone)]
+pub struct Repeated {
+    optics: Optics,
+    depth: Vec<u16>,
+    bayer: Vec<u8>,
+    infrared: Vec<u16>,
+}
+
+impl Repeated {
+    /// Repeats the first frame of this.
+    pub fn new(mut of: impl Content) -> Self {
+        Self { optics: of.optics(), depth: of.depth(0), bayer: of.bayer(0), infrared: of.infrared(0) }
+    }
+}
+
+impl Content for Repeated {
+    fn depth(&mut self, _frame: u64) -> Vec<u16> {
+        self.depth.clone()
+    }
+
+    fn bayer(&mut self, _frame: u64) -> Vec<u8> {
+        self.bayer.clone()
+    }
+
+    fn infrared(&mut self, _frame: u64) -> Vec<u16> {
+        self.infrared.clone()
+    }
+
+    fn optics(&self) -> Optics {
+        self.optics
+    }
+}
+
 /// One rendered frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RenderedFrame {

@@ -17,7 +17,7 @@ mod optics;
 mod packets;
 
 pub use camera::CameraModel;
-pub use content::{Content, Pattern, Rendered, RenderedFrame};
+pub use content::{Content, Pattern, Rendered, RenderedFrame, Repeated};
 pub use faults::{CommandFault, Fault, StreamFault};
 pub use motor::MotorModel;
 pub use optics::Optics;

@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use toile_capture::{CaptureError, ColorImage, Frame, Source};
+use toile_capture::{ColorImage, Frame};
 use toile_driver_models::{
     d435::{self, Content, D435, Pattern},
     uvc::{Fault, StreamFault, UvcModel, Wire},
@@ -43,19 +43,6 @@ pub fn depth_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {
 
 pub fn color_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {
     Fault { stream: d435::COLOR, frame, packet, what }
-}
-
-/// Frames until there are `count`, or the end, or an error.
-pub fn take(source: &mut dyn Source, count: usize) -> (Vec<Frame>, Option<CaptureError>) {
-    let mut frames = Vec::new();
-    while frames.len() < count {
-        match source.next_frame() {
-            Ok(Some(frame)) => frames.push(frame),
-            Ok(None) => break,
-            Err(error) => return (frames, Some(error)),
-        }
-    }
-    (frames, None)
 }
 
 /// True where a frame's depth is the pattern's of frame `number`, every pixel.

@@ -226,6 +226,8 @@ impl Assembler {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn payload(flags: u8, data: &[u8]) -> Vec<u8> {
@@ -247,6 +249,27 @@ mod tests {
         // Too much for the buffer.
         let long = assembler.push(&payload(2, &[6; 9]), 9);
         assert!(long[0].is_damaged && long[0].picture.len() == 4);
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_upset_the_parsers(
+            payloads in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..90), 0..40),
+            lengths in prop::collection::vec((2..14u8, 0..=255u8), 0..40),
+            whole in any::<bool>(),
+        ) {
+            functions(&payloads.concat());
+            let mut assembler = Assembler::new(64, 64, whole);
+            for (i, payload) in payloads.iter().enumerate() {
+                // Half of them have a header that may be one.
+                let likely = lengths.get(i).filter(|_| i % 2 == 0);
+                let header = likely.map(|(length, flags)| vec![*length, *flags]).unwrap_or_default();
+                for sent in assembler.push(&[header, payload.clone()].concat(), 0) {
+                    prop_assert!(sent.picture.len() <= 64 && sent.metadata.len() <= METADATA_ROOM);
+                    prop_assert!(sent.is_damaged || sent.picture.len() == 64);
+                }
+            }
+        }
     }
 
     #[test]
