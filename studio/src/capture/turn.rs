@@ -26,16 +26,31 @@ pub struct Turn {
 impl Turn {
     /// Takes the camera's pose in the scan frame (+Y up, +Z towards the camera at the first frame).
     pub fn push(&mut self, scan_from_camera: &Rigid) {
-        let place = scan_from_camera.translation.vector;
         if std::mem::take(&mut self.anew)
             && let Some((before, _)) = self.last
         {
-            self.offset = before - place.x.atan2(place.z);
+            self.offset = before - azimuth(scan_from_camera);
         }
-        let direction = place.x.atan2(place.z) + self.offset;
+        let direction = azimuth(scan_from_camera) + self.offset;
         let (before, turned) = self.last.unwrap_or((direction, 0.0));
         let step = (direction - before + PI).rem_euclid(TAU) - PI;
         self.last = Some((direction, turned + step));
+        self.mark(direction);
+    }
+
+    /// Another camera of the rig saw the subject at the same time.
+    pub fn also_seen_from(&mut self, scan_from_camera: &Rigid) {
+        self.mark(azimuth(scan_from_camera) + self.offset);
+    }
+
+    /// From now on poses are those of another camera, which stood here at the last pose, and in another scan frame.
+    pub fn follow_another(&mut self, scan_from_camera: &Rigid) {
+        let direction = azimuth(scan_from_camera) + self.offset;
+        self.last = self.last.map(|(_, turned)| (direction, turned));
+        self.start_anew();
+    }
+
+    fn mark(&mut self, direction: f64) {
         self.seen.resize(PARTS, false);
         // What a frame shows, it shows well 15° to either side.
         let reach = PARTS / 24;
@@ -73,6 +88,12 @@ impl Turn {
     }
 }
 
+/// Direction from the axis to a camera, about +Y from +Z.
+fn azimuth(scan_from_camera: &Rigid) -> f64 {
+    let place = scan_from_camera.translation.vector;
+    place.x.atan2(place.z)
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
@@ -106,6 +127,14 @@ mod tests {
         (0..=30).for_each(|i| anew.push(&at(f64::from(i) * 4.0)));
         assert!((anew.angle().to_degrees() - 300.0).abs() < 1e-6);
         assert_eq!(anew.unseen(), ["front right"]);
+        // Another camera stands a quarter of a turn ahead, and then takes over with a scan frame of its own.
+        let mut other = turn.clone();
+        other.also_seen_from(&at(270.0));
+        assert_eq!(other.unseen(), ["back right", "front right"]);
+        other.follow_another(&at(270.0));
+        (0..=15).for_each(|i| other.push(&at(f64::from(i) * 4.0)));
+        assert!((other.angle().to_degrees() - 240.0).abs() < 1e-6);
+        assert_eq!(other.unseen(), ["back right"]);
         // Back and forth is no turn.
         (0..=45).rev().for_each(|i| turn.push(&at(f64::from(i) * 4.0)));
         assert!(turn.angle() < 1e-9);

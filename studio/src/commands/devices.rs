@@ -1,14 +1,18 @@
 //! `toile devices`: what is plugged in, at which speed, and what is wrong with it.
 
-use std::path::Path;
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use serde_json::{Value, json};
 use toile_driver_realsense as realsense;
-use toile_driver_stereo as stereo;
+use toile_driver_stereo::{self as stereo, nodes::WideNode};
 use toile_driver_transport::{
+    known::{self, Family},
     udev,
     usb::{self, UsbCamera},
-    video::kernel::KernelVideo,
+    video::{NodeInfo, Video, kernel::KernelVideo},
 };
 use toile_driver_uvc_depth::nodes::{self, DepthNode};
 use toile_driver_webcam as webcam;
@@ -53,15 +57,23 @@ fn install() -> Result<Answer, StudioError> {
 fn list() -> Answer {
     let mut answer = Answer::default();
     let usb = usb::list().unwrap_or_else(|e| warn(&mut answer, &e));
-    let video = KernelVideo::default();
-    let cameras = realsense::list(&video).unwrap_or_else(|e| warn(&mut answer, &e));
-    // A RealSense camera's depth node speaks Z16 too, but is driven with its own calibration.
-    let is_realsense = |node: &Path| cameras.iter().any(|c| c.depth.as_ref().is_some_and(|n| n.pictures == node));
-    let nodes: Vec<DepthNode> = nodes::list(&video).into_iter().filter(|n| !is_realsense(&n.node)).collect();
-    let wide = stereo::nodes::list(&video);
     let webcams = webcam::list().unwrap_or_else(|e| warn(&mut answer, &e));
-    answer.text = text(&usb, &nodes, &webcams, &realsense_lines(&cameras, &mut answer.warnings), &wide);
-    for camera in &usb {
+    tell(answer, &usb, webcams, &KernelVideo::default())
+}
+
+/// Tells every camera once: as what `toile capture` drives it as.
+fn tell(mut answer: Answer, usb: &[UsbCamera], webcams: Vec<(u32, String)>, video: &dyn Video) -> Answer {
+    let cameras = realsense::list(video).unwrap_or_else(|e| warn(&mut answer, &e));
+    let mut told = nodes_told_already(video);
+    let nodes: Vec<DepthNode> = nodes::list(video).into_iter().filter(|n| !told.contains(&n.node)).collect();
+    told.extend(nodes.iter().map(|n| n.node.clone()));
+    let wide: Vec<WideNode> = stereo::nodes::list(video).into_iter().filter(|n| !told.contains(&n.node)).collect();
+    told.extend(wide.iter().map(|n| n.node.clone()));
+    let is_new = |(index, _): &(u32, String)| !told.contains(Path::new(&format!("/dev/video{index}")));
+    let webcams: Vec<(u32, String)> = webcams.into_iter().filter(is_new).collect();
+    answer.text = text(usb, &cameras, &nodes, &wide, &webcams);
+    answer.warnings.extend(cameras.iter().filter_map(missing_nodes));
+    for camera in usb {
         answer.warnings.extend(camera.problems.iter().map(|p| format!("{}: {p}", camera.name)));
     }
     answer.results = json!({
@@ -74,39 +86,52 @@ fn list() -> Answer {
     answer
 }
 
+/// Nodes of cameras that are told with their USB device (also those that the kernel's own Kinect driver makes), and
+/// nodes without pictures.
+fn nodes_told_already(video: &dyn Video) -> BTreeSet<PathBuf> {
+    let is_driven = |info: &NodeInfo| {
+        let known = info.usb.as_ref().and_then(|usb| known::find(usb.id.0, usb.id.1));
+        known.is_some_and(|known| known.family != Family::Orbbec)
+    };
+    let is_metadata = |info: &NodeInfo| video.open(&info.node).is_ok_and(|node| node.is_metadata());
+    let nodes = video.list().unwrap_or_default().into_iter();
+    nodes.filter(|info| is_driven(info) || is_metadata(info)).map(|info| info.node).collect()
+}
+
 fn warn<T>(answer: &mut Answer, error: &dyn std::fmt::Display) -> Vec<T> {
     answer.warnings.push(error.to_string());
     Vec::new()
 }
 
-/// Where each RealSense camera's streams are, and which it lacks.
-fn realsense_lines(cameras: &[realsense::Camera], warnings: &mut Vec<String>) -> Vec<String> {
-    let line = |camera: &realsense::Camera| {
-        let parts = [("depth", &camera.depth), ("infrared", &camera.infrared), ("colour", &camera.color)];
-        let missing: Vec<&str> = parts.iter().filter(|(_, nodes)| nodes.is_none()).map(|(name, _)| *name).collect();
-        if !missing.is_empty() {
-            let missing = missing.join(" and ");
-            warnings.push(format!("{}: no video node for {missing}: unplug it and plug it in again", camera.name));
-        }
-        let nodes = parts.iter().filter_map(|(name, nodes)| Some((name, nodes.as_ref()?)));
-        let nodes: Vec<String> = nodes.map(|(name, n)| format!("{name} {}", n.pictures.display())).collect();
-        format!("{} {}: {}", camera.name, camera.serial, nodes.join(", "))
-    };
-    cameras.iter().map(line).collect()
+/// What a RealSense camera lacks.
+fn missing_nodes(camera: &realsense::Camera) -> Option<String> {
+    let no_color = camera.color.is_none() && camera.has_color_part();
+    let parts = [("depth", camera.depth.is_none()), ("infrared", camera.infrared.is_none()), ("colour", no_color)];
+    let missing: Vec<&str> = parts.into_iter().filter(|(_, is_missing)| *is_missing).map(|(name, _)| name).collect();
+    let missing = (!missing.is_empty()).then(|| missing.join(" and "))?;
+    Some(format!("{}: no video node for {missing}: unplug it and plug it in again", camera.name))
 }
 
 fn text(
     usb: &[UsbCamera],
+    realsense: &[realsense::Camera],
     nodes: &[DepthNode],
+    wide: &[WideNode],
     webcams: &[(u32, String)],
-    realsense: &[String],
-    wide: &[stereo::nodes::WideNode],
 ) -> String {
+    let place = |(bus, address): (u8, u8)| format!("usb {bus:03}:{address:03}");
+    let is_realsense = |c: &&UsbCamera| realsense.iter().any(|r| r.address == c.address);
     let mut lines: Vec<String> = usb
         .iter()
-        .map(|c| format!("usb {:03}:{:03}  {} ({:?} speed)", c.address.0, c.address.1, c.name, c.speed))
+        .filter(|c| !is_realsense(c))
+        .map(|c| format!("{}  {} ({:?} speed)", place(c.address), c.name, c.speed))
         .collect();
-    lines.extend(realsense.iter().cloned());
+    lines.extend(realsense.iter().map(|c| {
+        let parts = [("depth", &c.depth), ("infrared", &c.infrared), ("colour", &c.color)].into_iter();
+        let nodes = parts.filter_map(|(name, n)| Some(format!("{name} {}", n.as_ref()?.pictures.display())));
+        let nodes = nodes.collect::<Vec<_>>().join(", ");
+        format!("{}  {} {} ({:?} speed): {nodes}", place(c.address), c.name, c.serial, c.speed)
+    }));
     lines.extend(nodes.iter().map(|n| format!("{}  {} (depth)", n.node.display(), n.name)));
     lines.extend(wide.iter().map(|n| {
         let (width, height) = n.size;
@@ -117,4 +142,67 @@ fn text(
         lines.push("No camera is plugged in.".into());
     }
     lines.join("\n") + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use toile_driver_models::{
+        d435,
+        side_by_side::{self, Views},
+        uvc::Wire,
+    };
+    use toile_driver_transport::{LinkSpeed, twin::VirtualBus, video::twin::VirtualVideo};
+
+    use super::*;
+
+    struct Dark;
+
+    impl Views for Dark {
+        fn size(&self) -> (u16, u16) {
+            (1280, 480)
+        }
+        fn brightness(&mut self, _frame: u64) -> Vec<u8> {
+            vec![16; 1280 * 480]
+        }
+    }
+
+    #[test]
+    fn every_camera_is_told_once_as_what_it_is() {
+        let bus = VirtualBus::default();
+        let d435 = bus.plug(Arc::new(Mutex::new(d435::model(d435::Pattern::default(), Wire::Bulk))));
+        bus.plug(Arc::new(Mutex::new(side_by_side::model(Dark, Wire::Bulk))));
+        let usb = UsbCamera {
+            name: "RealSense D435",
+            family: Family::Realsense,
+            id: (d435.vendor, d435.product),
+            address: d435.address,
+            speed: LinkSpeed::High,
+            problems: Vec::new(),
+        };
+        // The system calls every node a webcam; a laptop's own is on no known device.
+        let webcams = (0..9).map(|index| (index, format!("Node {index}"))).collect();
+        let answer = tell(Answer::default(), &[usb], webcams, &VirtualVideo::new(bus));
+        let lines: Vec<&str> = answer.text.lines().collect();
+        let depth = "usb 001:001  RealSense D435 827313080543 (High speed): \
+                     depth /dev/video0, infrared /dev/video2, colour /dev/video4";
+        assert_eq!(lines[0], depth);
+        assert!(lines[1].starts_with("/dev/video6") && lines[1].ends_with("(1280x480: two views side by side?)"));
+        assert_eq!(lines[2..], ["webcam 8  Node 8"]);
+        assert!(answer.warnings.is_empty(), "{:?}", answer.warnings);
+        assert_eq!(answer.results["webcams"].as_array().map(Vec::len), Some(1));
+    }
+
+    #[test]
+    fn nothing_and_a_camera_that_lacks_a_node_are_said() {
+        let nothing = tell(Answer::default(), &[], Vec::new(), &VirtualVideo::new(VirtualBus::default()));
+        assert_eq!(nothing.text, "No camera is plugged in.\n");
+        let bus = VirtualBus::default();
+        bus.plug(Arc::new(Mutex::new(d435::d405(d435::Pattern::default(), Wire::Bulk))));
+        let mut camera = realsense::list(&VirtualVideo::new(bus)).unwrap().remove(0);
+        assert_eq!(missing_nodes(&camera), None);
+        camera.depth = None;
+        assert!(missing_nodes(&camera).unwrap().contains("no video node for depth"));
+    }
 }
