@@ -20,6 +20,7 @@ demo: build ## Take the shipped recording to an avatar and say where to look
 test: demo ## The demo, then all tests, with the outside checkers that can be had here
 	@bash scripts/outside.sh
 	bash scripts/cargo.sh test --release --locked --workspace
+	bash scripts/cargo.sh test --release --locked -p toile-driver-kinect2 --test endurance -- --ignored
 	@bash tests/wire/wire.sh
 
 bench: setup ## Benchmarks
