@@ -114,7 +114,7 @@ fn an_unplug_ends_the_take_with_every_frame_that_came() {
 fn a_camera_that_is_plugged_in_again_records_the_next_take() {
     let dir = tempfile::tempdir().unwrap();
     let (bus, progress) = (VirtualBus::default(), Progress::new(true));
-    let take = |name: &str, faults: Vec<Fault>| {
+    let take = |name: &String, faults: Vec<Fault>| {
         bus.plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()).with_faults(faults))));
         let limit = Duration::from_secs(1);
         toile_driver_transport::wait_for(&bus, |info| info.product == 0x02ae, limit).unwrap();
@@ -124,13 +124,14 @@ fn a_camera_that_is_plugged_in_again_records_the_next_take() {
     };
     for round in 0..3 {
         let unplug = Fault { stream: Stream::Depth, frame: 5 + round, packet: 9, what: StreamFault::Unplug };
-        let torn = take("torn.mcap", vec![unplug]);
+        let names = ["torn", "whole"].map(|name| format!("{name}{round}.mcap"));
+        let torn = take(&names[0], vec![unplug]);
         assert!(torn.failed.is_some() && torn.frames >= 5 + round);
         // The first model took itself off the bus; the next one is another device to it.
-        let whole = take("whole.mcap", Vec::new());
+        let whole = take(&names[1], Vec::new());
         assert!(whole.failed.is_none() && whole.lost == 0, "{whole:?}");
         let frames = [torn.frames, whole.frames];
-        assert_eq!(["torn.mcap", "whole.mcap"].map(|name| self::frames(&dir.path().join(name)).len() as u64), frames);
+        assert_eq!(names.map(|name| self::frames(&dir.path().join(name)).len() as u64), frames);
         assert!(whole.frames >= 15);
     }
 }

@@ -291,13 +291,11 @@ mod tests {
 
     use super::*;
 
-    /// A virtual person who turns by 6° a frame.
+    /// A virtual person who turns by 6° a frame, and wears nothing that would have to be made first.
     fn turning() -> SyntheticDevice {
-        SyntheticDevice::open(
-            &SyntheticSettings { frames: 60, degrees: 354.0, seed: 3, ..SyntheticSettings::default() },
-            0,
-        )
-        .unwrap()
+        let scene =
+            SyntheticSettings { frames: 60, degrees: 354.0, seed: 3, garments: Vec::new(), ..Default::default() };
+        SyntheticDevice::open(&scene, 0).unwrap()
     }
 
     /// Frames of the person without colours, which need time.
