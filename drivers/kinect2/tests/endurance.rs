@@ -1,5 +1,5 @@
 //! Unplugs, long takes, and takes that are recorded again.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)] // helpers of tests are not seen as tests
 
 mod common;
 
