@@ -115,12 +115,15 @@ fn a_camera_that_is_plugged_in_again_records_the_next_take() {
     let dir = tempfile::tempdir().unwrap();
     let (bus, progress) = (VirtualBus::default(), Progress::new(true));
     let take = |name: &String, faults: Vec<Fault>| {
-        bus.plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()).with_faults(faults))));
+        let model = CameraModel::new(Pattern::default()).with_faults(faults);
+        let info = bus.plug(Arc::new(Mutex::new(model)));
         let limit = Duration::from_secs(1);
         toile_driver_transport::wait_for(&bus, |info| info.product == 0x02ae, limit).unwrap();
         let kinect = Box::new(Kinect1::open(&bus, None, Settings::default()).unwrap());
         let how = (Stop::After(0.5), Pace::Live);
-        record(kinect, &dir.path().join(name), how, &AtomicBool::new(false), &progress).unwrap()
+        let recorded = record(kinect, &dir.path().join(name), how, &AtomicBool::new(false), &progress).unwrap();
+        bus.unplug(&info);
+        recorded
     };
     for round in 0..3 {
         let unplug = Fault { stream: Stream::Depth, frame: 5 + round, packet: 9, what: StreamFault::Unplug };
