@@ -4,9 +4,10 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use serde::Deserialize;
 use serde_json::{Value, json};
 use toile_character::{Motion, SkinWeights, skinning};
-use toile_fitting::{BodyMeasure, MeasureTable};
+use toile_fitting::{BodyMeasure, MeasureTable, ScanLandmark};
 use toile_geometry::Mesh;
 
 use crate::{
@@ -22,7 +23,7 @@ use crate::{
 };
 
 /// Raised whenever the page looks different.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
 /// Times of the motion that are shown.
@@ -79,12 +80,15 @@ fn contents(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Re
     let body_mesh = run.read_mesh(&folders.body_mesh())?;
     let moved = motion::load(bvh, &body.skinned.skeleton)?.motion;
     let table: MeasureTable = read_json(&folders.measurements())?;
+    let found: Found = read_json(&folders.body_json())?;
     Ok(Contents {
         name: run.title().to_string(),
         subtitle: run.subtitle(),
         takes: takes.iter().map(|l| take_row(l, summary)).collect(),
         measurements: measurement_rows(&table),
         tapes: table.measures.into_iter().map(|m| m.path).collect(),
+        sections: found.girths.into_iter().map(|(name, girth)| (name, girth.height_m)).collect(),
+        landmarks: found.landmarks,
         standing: run.read_mesh(&folders.standing())?,
         warnings: summary.warnings.clone(),
         lost: summary.lost.clone(),
@@ -97,6 +101,19 @@ fn contents(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Re
         garments,
         seconds: seconds(run),
     })
+}
+
+/// What the page shows of `body.json`.
+#[derive(Deserialize)]
+struct Found {
+    landmarks: Vec<ScanLandmark>,
+    girths: BTreeMap<String, At>,
+}
+
+/// Height of a girth, metres.
+#[derive(Deserialize)]
+struct At {
+    height_m: f64,
 }
 
 /// What stacking says of each garment's gaps.

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
+use toile_fitting::ScanLandmark;
 use toile_garments::GAP_BINS_MM;
 use toile_geometry::Mesh;
 use toile_render::RenderError;
@@ -26,6 +27,10 @@ pub struct Contents {
     pub measurements: Vec<(String, String)>,
     /// Where the tapes lay on the standing body: corners in metres.
     pub tapes: Vec<Vec<[f64; 3]>>,
+    /// Landmarks on the first scan.
+    pub landmarks: Vec<ScanLandmark>,
+    /// Heights (metres) at which scan and body are cut, with their names.
+    pub sections: Vec<(String, f64)>,
     /// The body standing straight.
     pub standing: Mesh,
     /// What to worry about.
@@ -81,6 +86,10 @@ pub fn write(contents: &Contents, at: &Path, progress: &(dyn Fn(f32) + Sync)) ->
     page.section("Body", "The body fitted to the first scan. Dark is close, bright is far from it.");
     if let Some((_, scan)) = contents.scans.first() {
         page.pictures(&drawn(pictures::body_over_scan(scan, &contents.body))?)?;
+        page.subsection("Landmarks: found (green), set by hand (blue), estimated (ochre)");
+        page.pictures(&drawn(pictures::landmarks(scan, &contents.landmarks))?)?;
+        page.subsection("Sections of scan (blue) and body (red)");
+        page.pictures(&drawn(pictures::sections(scan, &contents.body, &contents.sections))?)?;
     }
     page.section("Measurements", "ISO 8559-1, standing straight; the red lines show where each was taken.");
     page.pictures(&drawn(pictures::measured(&contents.standing, &contents.tapes))?)?;

@@ -7,6 +7,7 @@ use std::{
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
+use toile_fitting::ScanLandmark;
 use toile_geometry::{Mesh, bvh::Bvh};
 use toile_render::{Drawn, RenderError, View, picture, sheet};
 
@@ -21,6 +22,15 @@ const DISTANCE: &str = "distance_mm";
 /// Colour and radius (metres) of the tapes on the body.
 const TAPE: [u8; 3] = [200, 30, 40];
 const CORD_RADIUS: f32 = 0.004;
+/// Half the width of a mark at a landmark, metres, and its colour: found on the scan, set by hand, estimated.
+const MARK: f32 = 0.008;
+const FOUND: [u8; 3] = [30, 120, 60];
+const BY_HAND: [u8; 3] = [30, 80, 200];
+const ESTIMATED: [u8; 3] = [190, 120, 30];
+/// Colours of the scan's and the body's section.
+const SECTION_OF_SCAN: [u8; 3] = [30, 60, 140];
+/// Elevation from which sections are seen, radians.
+const FROM_ABOVE: f64 = 1.5;
 /// Space between layers that are drawn apart, metres.
 const BETWEEN: f32 = 0.1;
 /// Colour of the body under a garment.
@@ -58,6 +68,62 @@ pub fn body_over_scan(scan: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderEr
     pictures.push(one(&[Drawn::clay(body)], &View::front(), "body, front")?);
     pictures.push(one(&[Drawn::clay(body)], &View::around(FRAC_PI_2, 0.0), "body, left side")?);
     Ok(pictures)
+}
+
+/// The landmarks on the scan from front, side and back: found (green), set by hand (blue), estimated (ochre).
+///
+/// # Errors
+/// [`RenderError`] where the mesh cannot be drawn.
+pub fn landmarks(scan: &Mesh, landmarks: &[ScanLandmark]) -> Result<Vec<Picture>, RenderError> {
+    let marks = |is_one: &dyn Fn(&ScanLandmark) -> bool| {
+        cords(&landmarks.iter().filter(|l| is_one(l)).flat_map(|l| cross(l.position)).collect::<Vec<_>>())
+    };
+    let found = marks(&|l| !l.by_hand && l.seen > 0.0);
+    let (by_hand, estimated) = (marks(&|l| l.by_hand), marks(&|l| !l.by_hand && l.seen == 0.0));
+    let drawn = [
+        Drawn::clay(scan),
+        Drawn::solid(&found, FOUND, 1.0),
+        Drawn::solid(&by_hand, BY_HAND, 1.0),
+        Drawn::solid(&estimated, ESTIMATED, 1.0),
+    ];
+    turn(&drawn, &["landmarks, front", "landmarks, left side", "landmarks, back"])
+}
+
+/// Three strokes through a point.
+fn cross(at: [f64; 3]) -> Vec<Vec<[f64; 3]>> {
+    let stroke = |axis: usize| {
+        let end = |sign: f64| std::array::from_fn(|k| at[k] + if k == axis { sign * f64::from(MARK) } else { 0.0 });
+        vec![end(-1.0), end(1.0)]
+    };
+    (0..3).map(stroke).collect()
+}
+
+/// Sections of scan (blue) and body (red) at some heights (metres, with their names), seen from above.
+///
+/// # Errors
+/// [`RenderError`] where a mesh cannot be drawn.
+pub fn sections(scan: &Mesh, body: &Mesh, heights: &[(String, f64)]) -> Result<Vec<Picture>, RenderError> {
+    let one_height = |(name, height): &(String, f64)| {
+        let [of_scan, of_body] = [scan, body].map(|mesh| cords(&section(mesh, *height as f32)));
+        let view = View { bounds: bounds([&of_scan, &of_body]), ..View::around(0.0, FROM_ABOVE) };
+        let drawn = [Drawn::solid(&of_scan, SECTION_OF_SCAN, 1.0), Drawn::solid(&of_body, TAPE, 1.0)];
+        one(&drawn, &view, &format!("section at the {name}, from above"))
+    };
+    heights.iter().map(one_height).collect()
+}
+
+/// Where the level at `height` cuts the triangles: pieces of two points.
+fn section(mesh: &Mesh, height: f32) -> Vec<Vec<[f64; 3]>> {
+    let cut = |corners: [Point3<f32>; 3]| {
+        let crossing = |k: usize| {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            let crosses = (a.y < height) != (b.y < height);
+            crosses.then(|| (a + (b - a) * ((height - a.y) / (b.y - a.y))).cast::<f64>().into())
+        };
+        let ends: Vec<[f64; 3]> = (0..3).filter_map(crossing).collect();
+        (ends.len() == 2).then_some(ends)
+    };
+    (0..mesh.triangles.len()).filter_map(|t| cut(mesh.corners(t))).collect()
 }
 
 /// The standing body with the tapes that measured it from front, side and back.
@@ -190,4 +256,21 @@ fn turn(drawn: &[Drawn], names: &[&str; 3]) -> Result<Vec<Picture>, RenderError>
 
 fn one(drawn: &[Drawn], view: &View, caption: &str) -> Result<Picture, RenderError> {
     Ok(Picture { caption: caption.into(), image: picture(drawn, view, SIZE.0, SIZE.1)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_section_of_a_tetrahedron_is_a_triangle_at_that_height() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]].map(Point3::from);
+        let mesh = Mesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]);
+        let pieces = section(&mesh, 0.25);
+        assert_eq!(pieces.len(), 3);
+        let length: f64 = pieces.iter().map(|p| (Point3::from(p[0]) - Point3::from(p[1])).norm()).sum();
+        assert!((length - 0.75 * (2.0 + 2f64.sqrt())).abs() < 1e-6, "{length}");
+        assert!(pieces.iter().flatten().all(|p| (p[1] - 0.25).abs() < 1e-6));
+        assert!(section(&mesh, 1.5).is_empty());
+    }
 }
