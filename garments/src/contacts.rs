@@ -163,10 +163,13 @@ impl Swept {
     fn new(positions: &[Point3<f32>], moved: &[f32], region: &Region, reach: f32) -> Self {
         let (mut low, mut high) = ([f32::INFINITY; 3].into(), [f32::NEG_INFINITY; 3].into());
         let mut most = 0.0f32;
+        // A vertex may have left the region.
+        let region = region.grown(moved.iter().copied().fold(0.0, f32::max));
         for (p, &m) in positions.iter().zip(moved).filter(|(p, m)| **m > 0.0 && region.holds(p)) {
             (low, high, most) = (p.inf(&low), p.sup(&high), most.max(m));
         }
-        let around = Vector3::repeat(reach);
+        // Around where they are and where they were.
+        let around = Vector3::repeat(reach + most);
         Self { low: low - around, high: high + around, most }
     }
 

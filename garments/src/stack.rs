@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Most times that all layers are looked at.
-const PASSES: usize = 4;
+const PASSES: usize = 6;
 
 /// Moves the `layers` (inside to outside, in the pose of `body`) so that each lies outside the body and all layers
 /// below it. The body stays.
@@ -80,16 +80,22 @@ fn settle(
 ) -> (usize, Vec<Contact>) {
     let mut contacts = Contacts::new(surfaces);
     let mut own = own_before.to_vec();
-    let mut rounds = 0;
+    let (mut rounds, mut fresh) = (0, true);
     for pass in 0..PASSES {
         let left = too_near(&mut contacts, surfaces, settings);
         let tangled = own.iter().enumerate().flat_map(|(k, pairs)| pairs.iter().map(move |p| (k, p[0])));
         let tangled = tangled.map(|(k, t)| surfaces[k].mesh.corners(t as usize)[0]);
         let places = left.iter().map(|c| surfaces[c.upper.surface].mesh.positions[c.upper.corners[0] as usize]);
         let regions = regions(places.chain(tangled));
-        if regions.is_empty() {
+        if regions.is_empty() && fresh {
             return (rounds, left);
         }
+        if regions.is_empty() {
+            // Believed only after everything was looked at afresh.
+            (contacts, fresh) = (Contacts::new(surfaces), true);
+            continue;
+        }
+        fresh = false;
         let solved: Vec<(Vec<Moved>, usize)> = regions.par_iter().map(|r| r.solve(surfaces, settings)).collect();
         rounds = solved.iter().map(|s| s.1).fold(rounds, usize::max);
         let still = solved.iter().all(|s| s.0.is_empty());
@@ -100,7 +106,7 @@ fn settle(
             break;
         }
     }
-    (rounds, too_near(&mut contacts, surfaces, settings))
+    (rounds, too_near(&mut Contacts::new(surfaces), surfaces, settings))
 }
 
 fn too_near(contacts: &mut Contacts, surfaces: &[WornSurface], settings: &StackSettings) -> Vec<Contact> {
