@@ -82,7 +82,7 @@ impl PinholeCamera {
         )
     }
 
-    /// Fixed-point inverse of [`Self::distort`]; converges for the lenses of depth cameras in a few steps.
+    /// Fixed-point inverse of [`Self::distort`]; converges for the lenses of depth cameras in a few steps, and stops there.
     fn undistort(&self, xd: f64, yd: f64) -> (f64, f64) {
         if !self.is_distorted() {
             return (xd, yd);
@@ -90,8 +90,11 @@ impl PinholeCamera {
         let (mut x, mut y) = (xd, yd);
         for _ in 0..20 {
             let (dx, dy) = self.distort(x, y);
-            x += xd - dx;
-            y += yd - dy;
+            let next = (x + (xd - dx), y + (yd - dy));
+            if next == (x, y) {
+                break;
+            }
+            (x, y) = next;
         }
         (x, y)
     }

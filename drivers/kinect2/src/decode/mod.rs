@@ -216,14 +216,16 @@ impl Tables {
     fn new(calibration: &Calibration) -> Self {
         // P0 is told mirrored, as the sensor sees.
         let mirrored = |i: usize| i - i % COLUMNS + COLUMNS - 1 - i % COLUMNS;
-        let phase = |f: usize, i: usize| P0_UNIT * f64::from(calibration.p0[f][mirrored(i)]);
+        // P0 has fewer values than the image has pixels.
+        let turns: Vec<(f64, f64)> = (0..=u16::MAX).map(|p0| (P0_UNIT * f64::from(p0)).sin_cos()).collect();
+        let turn = |f: usize, i: usize| turns[usize::from(calibration.p0[f][mirrored(i)])];
         let rays = calibration.depth.rays();
         let slope = |i: usize| rays[i].map(f64::from);
         let z = |i: usize| UNIT_MM / (1.0 + slope(i)[0].powi(2) + slope(i)[1].powi(2)).sqrt();
         Self {
             lut: lut::lut(),
-            cos: std::array::from_fn(|f| table(|i| GAIN[f] * phase(f, i).cos())),
-            sin: std::array::from_fn(|f| table(|i| GAIN[f] * phase(f, i).sin())),
+            cos: std::array::from_fn(|f| table(|i| GAIN[f] * turn(f, i).1)),
+            sin: std::array::from_fn(|f| table(|i| GAIN[f] * turn(f, i).0)),
             z: table(z),
             parallax: table(|i| -slope(i)[0] * z(i) * PARALLAX / (2.0 * UNIT_MM).powi(2)),
         }
