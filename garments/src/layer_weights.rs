@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use toile_character::{SkinWeights, joint::JOINT_COUNT};
 use toile_geometry::{Mesh, bvh::Bvh};
 
-use crate::{GarmentError, hanging::FREE_PART, surface_solve::SurfaceSystem};
+use crate::{GarmentError, common_frame::push_continuous, hanging::FREE_PART, surface_solve::SurfaceSystem};
 
 /// Nearer than the first a vertex has the weights of the layer below; further than the second its own; metres.
 const NEAR: [f32; 2] = [0.015, 0.03];
@@ -65,8 +65,7 @@ fn carried(upper: &Mesh, own: &SkinWeights, lowers: &[Lower]) -> SkinWeights {
         .collect();
     let mut out = SkinWeights::default();
     for v in 0..own.len() {
-        let influences: Vec<(u8, f32)> = used.iter().zip(&columns).map(|(&j, c)| (j as u8, c[v])).collect();
-        out.push(&influences);
+        push_continuous(&mut out, used.iter().zip(&columns).map(|(&j, c)| (j as u8, c[v])));
     }
     out
 }

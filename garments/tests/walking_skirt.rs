@@ -1,0 +1,80 @@
+//! A skirt in a walk, moved by its skin weights alone.
+
+#![allow(clippy::unwrap_used)] // all of it is test code
+
+use std::path::PathBuf;
+
+use toile_animation::{RetargetSettings, bvh, retarget, shipped_walk};
+use toile_character::Pose;
+use toile_garments::{ExtractSettings, Take, Worn, common_frame, hanging, posed_report};
+use toile_geometry::{Mesh, remesh};
+use toile_synthetic::{GarmentKind, GarmentSettings, Subject, SyntheticSettings};
+
+/// Every so many frames of a motion are looked at.
+const STRIDE: usize = 6;
+/// No triangle may be stretched more.
+const MOST_STRETCH: f32 = 3.0;
+
+fn dressed(seed: u64) -> Subject {
+    let garments = vec![GarmentSettings::of(GarmentKind::Skirt)];
+    Subject::new(&SyntheticSettings { seed, garments, ..SyntheticSettings::default() }).unwrap()
+}
+
+/// The skirt in the triangles that an extracted garment has: those of its truth, cut at the hem, are slivers down to
+/// 0.01 mm. Marked where it hangs free.
+fn skirt_of(subject: &Subject) -> Mesh {
+    let mut skirt = remesh::isotropic(&subject.garments[0].worn.mesh, ExtractSettings::default().edge_length);
+    let free = hanging::mark_free(&subject.person.body.mesh, &skirt);
+    free_below(&skirt, &free);
+    skirt.attributes.insert(hanging::FREE_PART.into(), free);
+    skirt
+}
+
+/// The shipped walk and, where the private data is, a recorded walk and a jog.
+fn motions() -> Vec<toile_animation::Bvh> {
+    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real/motion");
+    let recorded = ["bandai_a/dataset-1_walk_normal_001.bvh", "cmu_a/02_03.bvh"].map(|name| data.join(name));
+    let recorded = recorded.iter().filter(|path| path.exists()).map(|path| bvh::read(path).unwrap());
+    std::iter::once(shipped_walk().unwrap()).chain(recorded).collect()
+}
+
+#[test]
+fn a_skirt_is_not_torn_between_the_legs() {
+    for seed in [5, 7] {
+        let subject = dressed(seed);
+        let body = &subject.person.body;
+        let skirt = &skirt_of(&subject);
+        let rest = Pose::identity();
+        let take = Take {
+            scan: skirt,
+            previous: &body.mesh,
+            body: &body.mesh,
+            weights: &body.weights,
+            skeleton: &body.skeleton,
+            pose: &rest,
+            pose0: &rest,
+            garment_type: None,
+            edits: None,
+        };
+        let weights = common_frame::weights(&take, skirt, &ExtractSettings::default());
+        let poses =
+            |motion| retarget(motion, "walk", &body.skeleton, &RetargetSettings::default()).unwrap().motion.poses;
+        let poses: Vec<Pose> = motions().iter().flat_map(|motion| poses(motion).into_iter().step_by(STRIDE)).collect();
+        let worn = Worn { mesh: skirt, weights: &weights };
+        let report = &posed_report(&[worn], &body.skeleton, &rest, &poses)[0];
+        assert!(poses.len() >= 5 && report.stretch_most < MOST_STRETCH, "seed {seed}: {report:?}");
+        assert!(report.stretch_most > 1.02, "the skirt does not move: {report:?}");
+    }
+}
+
+/// Cloth hangs free at the hem and is close at the waist.
+fn free_below(skirt: &Mesh, free: &[f32]) {
+    let (lo, hi) = skirt.bounds().unwrap();
+    let share = |low: f32, high: f32| {
+        let at = |y: f32| (y - lo.y) / (hi.y - lo.y);
+        let of: Vec<f32> =
+            skirt.positions.iter().zip(free).filter(|(p, _)| (low..high).contains(&at(p.y))).map(|x| *x.1).collect();
+        of.iter().sum::<f32>() / of.len() as f32
+    };
+    assert!(share(0.0, 0.2) > 0.6 && share(0.9, 1.01) < 0.4, "{} {}", share(0.0, 0.2), share(0.9, 1.01));
+}
