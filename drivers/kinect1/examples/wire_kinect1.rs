@@ -19,7 +19,7 @@ use toile_capture::{ColorImage, Frame, Source};
 use toile_driver_kinect1::{Kinect1, Settings};
 use toile_driver_models::{
     kinect1::{CameraModel, Content, Pattern},
-    proof::{self, Bench, difference},
+    proof::{self, Bench, Shown, same},
     vhci::{self, Plugged},
 };
 use toile_driver_transport::{
@@ -42,7 +42,7 @@ fn main() -> Outcome<()> {
         }
         ["check", file, count] => {
             let table = millimetres();
-            println!("{}", proof::take(Path::new(file), count.parse()?, |frame| differs(frame, &table))?);
+            println!("{}", proof::take(Path::new(file), count.parse()?, |frame| shown(frame, &table))?);
         }
         ["gspca", node, count] => gspca(Path::new(node), count.parse()?)?,
         ["first"] => println!("{}", proof::first_frame(&mut Wire::new()?)?),
@@ -88,28 +88,30 @@ impl Bench for Wire {
         Ok(Box::new(Kinect1::open(&self.bus, None, settings).map_err(|error| error.to_string())?))
     }
 
-    fn difference(&mut self, frame: &Frame) -> Option<String> {
-        differs(frame, &self.mm_from_raw)
+    fn shown(&mut self, frame: &Frame) -> Shown {
+        shown(frame, &self.mm_from_raw)
     }
 }
 
-/// How a frame differs from what the model sent at its time.
-fn differs(frame: &Frame, mm_from_raw: &[u16]) -> Option<String> {
+/// A frame beside what the model sent at its time: no two of its frames are alike.
+fn shown(frame: &Frame, mm_from_raw: &[u16]) -> Shown {
     // The model's number of a frame, by its time: 30 a second.
     let number = (frame.device_time_ns as f64 * 30e-9).round() as u64;
-    let depth = frame.depth.as_ref().and_then(|depth| {
+    if let Some(depth) = &frame.depth {
         let sent = Pattern::default().depth(number);
         let sent: Vec<u16> = sent.iter().map(|raw| mm_from_raw[usize::from(*raw)]).collect();
-        difference("depth", &depth.values, &sent)
-    });
+        same("depth", &depth.values, &sent)?;
+    }
     let filter = |i: usize| [[1, 0], [2, 1]][i / 640 % 2][i % 2];
-    depth.or_else(|| match frame.color.as_ref()? {
-        ColorImage::Rgb(image) => {
+    match &frame.color {
+        None => {}
+        Some(ColorImage::Rgb(image)) => {
             let seen: Vec<u8> = image.pixels.iter().enumerate().map(|(i, p)| p[filter(i)]).collect();
-            difference("colour", &seen, &Pattern::default().bayer(number))
+            same("colour", &seen, &Pattern::default().bayer(number))?;
         }
-        _ => Some("colour has no pixels".into()),
-    })
+        Some(_) => return Err("colour has no pixels".into()),
+    }
+    Ok(Some(number))
 }
 
 /// Millimetres of every raw value by the model's optics: z = 10·r·e / (e − m).

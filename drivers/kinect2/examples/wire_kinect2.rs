@@ -23,7 +23,7 @@ use toile_driver_kinect2::{
 };
 use toile_driver_models::{
     kinect2::{CameraModel, Content, Optics, Pattern},
-    proof::{self, Bench, difference},
+    proof::{self, Bench, Shown, same},
     vhci::{self, Plugged},
 };
 use toile_driver_transport::{Bus, libusb::LibusbBus};
@@ -46,7 +46,7 @@ fn main() -> Outcome<()> {
         }
         ["check", file, take, count] => {
             let images = Images::read(file)?;
-            println!("{}", proof::take(Path::new(take), count.parse()?, |frame| images.difference(frame))?);
+            println!("{}", proof::take(Path::new(take), count.parse()?, |frame| images.shown(frame))?);
         }
         ["first", file] => println!("{}", proof::first_frame(&mut Wire::new(file)?)?),
         ["cycles", file, count] => println!("{}", proof::cycles(&mut Wire::new(file)?, count.parse()?)?),
@@ -106,17 +106,21 @@ impl Images {
         vhci::plug(Arc::new(Mutex::new(CameraModel::new(self.clone()))))
     }
 
-    /// How a frame differs from what must arrive at its time.
-    fn difference(&self, frame: &Frame) -> Option<String> {
+    /// A frame beside what must arrive at its time.
+    fn shown(&self, frame: &Frame) -> Shown {
         // The model's number of a frame, by its time: 30 a second.
-        let [_, _, mm, colors] = self.frame((frame.device_time_ns as f64 * 30e-9).round() as u64);
+        let number = (frame.device_time_ns as f64 * 30e-9).round() as u64;
+        let [_, _, mm, colors] = self.frame(number);
         let sent: Vec<u16> = mm.as_chunks().0.iter().map(|b| u16::from_le_bytes(*b)).collect();
         // Colour that came alone cannot be registered by this depth.
-        let depth = frame.depth.as_ref()?;
-        difference("depth", &depth.values, &sent).or_else(|| match frame.color.as_ref()? {
-            ColorImage::Rgb(image) => difference("colour", image.pixels.as_flattened(), colors),
-            _ => Some("colour has no pixels".into()),
-        })
+        let Some(depth) = &frame.depth else { return Ok(None) };
+        same("depth", &depth.values, &sent)?;
+        match &frame.color {
+            None => {}
+            Some(ColorImage::Rgb(image)) => same("colour", image.pixels.as_flattened(), colors)?,
+            Some(_) => return Err("colour has no pixels".into()),
+        }
+        Ok(Some(number))
     }
 }
 
@@ -166,7 +170,7 @@ impl Bench for Wire {
         Ok(Box::new(Kinect2::open(&self.bus, None, settings).map_err(|error| error.to_string())?))
     }
 
-    fn difference(&mut self, frame: &Frame) -> Option<String> {
-        self.images.difference(frame)
+    fn shown(&mut self, frame: &Frame) -> Shown {
+        self.images.shown(frame)
     }
 }

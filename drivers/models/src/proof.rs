@@ -22,6 +22,11 @@ const FIRST_LIMIT: Duration = Duration::from_secs(1);
 const FIRST_TRIES: u32 = 5;
 /// Frames of a cycle before the unplugging.
 const CYCLE_FRAMES: u32 = 2;
+/// One frame in so many may lack its depth or its colour: streams lose pictures apart from each other.
+const UNPAIRED: u64 = 10;
+
+/// The model's number of what a frame shows, `None` where it has nothing to tell it by; or how it differs from that.
+pub type Shown = Result<Option<u64>, String>;
 
 /// A model and the driver that it is to prove.
 pub trait Bench {
@@ -43,47 +48,69 @@ pub trait Bench {
     /// What the driver says.
     fn open(&mut self) -> Result<Box<dyn Source>, String>;
 
-    /// How a frame differs from what the model sent; `None` where every pixel is the same.
-    fn difference(&mut self, frame: &Frame) -> Option<String>;
+    /// What the model sent as this frame, where every pixel is the same.
+    ///
+    /// # Errors
+    /// How it differs.
+    fn shown(&mut self, frame: &Frame) -> Shown;
 }
 
-/// How an image differs from what was sent; `None` where it does not.
-pub fn difference<T: PartialEq + Debug>(what: &str, seen: &[T], sent: &[T]) -> Option<String> {
-    if seen.len() != sent.len() {
-        return Some(format!("{what} has {} pixels instead of {}", seen.len(), sent.len()));
-    }
-    let at = seen.iter().zip(sent).position(|(a, b)| a != b)?;
-    let count = seen.iter().zip(sent).filter(|(a, b)| a != b).count();
-    Some(format!("{what} differs in {count} pixels, first in {at}: {:?} instead of {:?}", seen[at], sent[at]))
-}
-
-/// Compares the first `count` frames of a take with what the model sent, and its numbers with the losses that it tells.
+/// Compares an image with what was sent.
 ///
 /// # Errors
-/// What differs.
-pub fn take(file: &Path, count: u64, mut difference: impl FnMut(&Frame) -> Option<String>) -> Result<String, String> {
+/// How it differs.
+pub fn same<T: PartialEq + Debug>(what: &str, seen: &[T], sent: &[T]) -> Result<(), String> {
+    if seen.len() != sent.len() {
+        return Err(format!("{what} has {} pixels instead of {}", seen.len(), sent.len()));
+    }
+    let Some(at) = seen.iter().zip(sent).position(|(a, b)| a != b) else { return Ok(()) };
+    let count = seen.iter().zip(sent).filter(|(a, b)| a != b).count();
+    Err(format!("{what} differs in {count} pixels, first in {at}: {:?} instead of {:?}", seen[at], sent[at]))
+}
+
+/// Compares the first `count` frames of a take with what the model sent, and the losses that it tells with the steps of
+/// the model's numbers.
+///
+/// # Errors
+/// What differs; where more than a tenth of the frames lack depth or colour.
+pub fn take(file: &Path, count: u64, shown: impl FnMut(&Frame) -> Shown) -> Result<String, String> {
     let replay = Replay::open(file).map_err(|error| error.to_string())?;
-    let (mut identical, mut lost, mut unpaired) = (0, 0, 0);
-    let (mut last, mut wrong) = (None, Vec::new());
-    for index in 0..replay.len().min(count) {
-        let frame = replay.frame(index).map_err(|error| error.to_string())?;
-        let Frame { device_frame: number, lost_before, .. } = frame;
-        match difference(&frame) {
-            None => identical += 1,
-            Some(how) => wrong.push(format!("frame {index} (device's {number}): {how}")),
-        }
-        if last.is_some_and(|last: u64| number != last + 1 + u64::from(lost_before)) {
-            wrong.push(format!("frame {index} is the device's {number} and tells {lost_before} lost after {last:?}"));
-        }
-        last = Some(number);
-        lost += u64::from(lost_before);
+    let frames = (0..replay.len().min(count)).map(|index| replay.frame(index).map_err(|error| error.to_string()));
+    compare(frames, count, shown)
+}
+
+fn compare(
+    frames: impl Iterator<Item = Result<Frame, String>>,
+    count: u64,
+    mut shown: impl FnMut(&Frame) -> Shown,
+) -> Result<String, String> {
+    let (mut seen, mut identical, mut lost, mut unpaired) = (0, 0, 0, 0);
+    // The model's number that was told last, and what the frames since then make of it.
+    let (mut expected, mut wrong) = (None, Vec::new());
+    for frame in frames {
+        let frame = frame?;
+        lost += u64::from(frame.lost_before);
         unpaired += u64::from(frame.depth.is_none() || frame.color.is_none());
+        expected = expected.map(|last: u64| last + 1 + u64::from(frame.lost_before));
+        match shown(&frame) {
+            Err(how) => wrong.push(format!("frame {seen} (device's {}): {how}", frame.device_frame)),
+            Ok(_) if frame.depth.is_none() && frame.color.is_none() => wrong.push(format!("frame {seen} is empty")),
+            Ok(number) => {
+                identical += 1;
+                if let (Some(number), Some(expected)) = (number, expected.filter(|e| number.is_some_and(|n| n != *e))) {
+                    wrong.push(format!("frame {seen} is the model's {number}: by the losses that are told {expected}"));
+                }
+                expected = number.or(expected);
+            }
+        }
+        seen += 1;
     }
     let said = format!("{identical}/{count} (lost {lost}, unpaired {unpaired})");
     match wrong.first() {
-        None if identical == count => Ok(said),
-        None => Err(format!("{said}: the take has only {} frames", replay.len())),
         Some(first) => Err(format!("{said}: {first}; {} such in all", wrong.len())),
+        None if seen < count => Err(format!("{said}: the take has only {seen} frames")),
+        None if unpaired * UNPAIRED > count => Err(format!("{said}: too many frames lack depth or colour")),
+        None => Ok(said),
     }
 }
 
@@ -100,9 +127,7 @@ pub fn first_frame(bench: &mut impl Bench) -> Result<String, String> {
         let mut source = bench.open()?;
         let frame = next(&mut *source)?;
         best = best.min(start.elapsed());
-        if let Some(how) = bench.difference(&frame) {
-            return Err(format!("first frame: {how}"));
-        }
+        bench.shown(&frame).map_err(|how| format!("first frame: {how}"))?;
         drop(source);
         plugged.unplug().map_err(|error| error.to_string())?;
         wait("unplugging", || bench.is_gone())?;
@@ -137,9 +162,7 @@ fn one_cycle(bench: &mut impl Bench) -> Result<(), String> {
     let mut source = bench.open()?;
     for _ in 0..CYCLE_FRAMES {
         let frame = next(&mut *source)?;
-        if let Some(how) = bench.difference(&frame) {
-            return Err(format!("device's frame {}: {how}", frame.device_frame));
-        }
+        bench.shown(&frame).map_err(|how| format!("device's frame {}: {how}", frame.device_frame))?;
     }
     plugged.unplug().map_err(|error| error.to_string())?;
     let ended = loop {
@@ -173,13 +196,51 @@ fn wait(what: &str, mut is_done: impl FnMut() -> bool) -> Result<(), String> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use toile_capture::{ColorImage, DepthImage, RgbImage};
+
     use super::*;
 
     #[test]
     fn differences_are_told_with_their_place() {
-        assert_eq!(difference("depth", &[1, 2, 3], &[1, 2, 3]), None);
-        let how = difference("depth", &[1, 7, 8], &[1, 2, 3]).unwrap();
+        assert_eq!(same("depth", &[1, 2, 3], &[1, 2, 3]), Ok(()));
+        let how = same("depth", &[1, 7, 8], &[1, 2, 3]).unwrap_err();
         assert_eq!(how, "depth differs in 2 pixels, first in 1: 7 instead of 2");
-        assert!(difference("depth", &[1], &[1, 2]).unwrap().contains("1 pixels instead of 2"));
+        assert!(same("depth", &[1], &[1, 2]).unwrap_err().contains("1 pixels instead of 2"));
+    }
+
+    /// A take of frames that show these numbers of the model, each with what it tells lost; the first `unpaired`
+    /// have no depth.
+    fn compared(numbers: &[(u64, u32)], unpaired: usize) -> Result<String, String> {
+        let depth = DepthImage { width: 1, height: 1, values: vec![1] };
+        let color = ColorImage::Rgb(Arc::new(RgbImage { width: 1, height: 1, pixels: vec![[0; 3]] }));
+        let frames = numbers.iter().enumerate().map(|(i, (number, lost))| {
+            Ok(Frame {
+                sensor: 0,
+                index: i as u64,
+                device_frame: 0,
+                lost_before: *lost,
+                device_time_ns: *number as i64,
+                host_time_ns: 0,
+                depth: (i >= unpaired).then(|| Arc::new(depth.clone())),
+                color: Some(color.clone()),
+            })
+        });
+        compare(frames, numbers.len() as u64, |frame| Ok(frame.depth.as_ref().map(|_| frame.device_time_ns as u64)))
+    }
+
+    #[test]
+    fn losses_must_be_those_of_the_models_numbers() {
+        assert_eq!(compared(&[(7, 0), (8, 0), (11, 2)], 0).unwrap(), "3/3 (lost 2, unpaired 0)");
+        assert!(compared(&[(7, 0), (8, 0), (11, 0)], 0).unwrap_err().contains("is the model's 11"));
+        assert!(compared(&[(7, 0), (8, 1), (9, 0)], 0).unwrap_err().contains("is the model's 8"));
+    }
+
+    #[test]
+    fn a_tenth_may_lack_depth() {
+        let numbers: Vec<(u64, u32)> = (0..20).map(|k| (k, 0)).collect();
+        assert_eq!(compared(&numbers, 2).unwrap(), "20/20 (lost 0, unpaired 2)");
+        assert!(compared(&numbers, 3).unwrap_err().contains("too many frames lack"));
     }
 }

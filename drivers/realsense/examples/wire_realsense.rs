@@ -19,7 +19,7 @@ use std::{
 use toile_capture::{ColorImage, Frame, Source};
 use toile_driver_models::{
     d435::{self, Content, Pattern},
-    proof::{self, Bench, difference},
+    proof::{self, Bench, Shown, same},
     uvc::Wire,
     vhci::{self, Plugged},
 };
@@ -40,7 +40,7 @@ fn main() -> Outcome<()> {
                 println!("server: {error}");
             }
         }
-        ["check", file, count] => println!("{}", proof::take(Path::new(file), count.parse()?, differs)?),
+        ["check", file, count] => println!("{}", proof::take(Path::new(file), count.parse()?, shown)?),
         ["first", name] => println!("{}", proof::first_frame(&mut Kernel::new(&[wire(name)?]))?),
         ["cycles", count] => {
             println!("{}", proof::cycles(&mut Kernel::new(&[Wire::Bulk, Wire::Isochronous]), count.parse()?)?)
@@ -94,20 +94,25 @@ impl Bench for Kernel {
         Ok(Box::new(Realsense::open(&self.video, None, settings).map_err(|error| error.to_string())?))
     }
 
-    fn difference(&mut self, frame: &Frame) -> Option<String> {
-        differs(frame)
+    fn shown(&mut self, frame: &Frame) -> Shown {
+        shown(frame)
     }
 }
 
-/// How a frame differs from what the model sent at its time: colours by ITU-R BT.601, within one step of rounding.
-fn differs(frame: &Frame) -> Option<String> {
+/// A frame beside what the model sent at its time, no two of its frames being alike: colours by ITU-R BT.601, within one
+/// step of rounding.
+fn shown(frame: &Frame) -> Shown {
     let number = (frame.device_time_ns as f64 * 30e-9).round() as u64;
-    let depth = frame.depth.as_ref();
-    let depth = depth.and_then(|d| difference("depth", &d.values, &Pattern::default().depth(number, SIZE)));
-    depth.or_else(|| match frame.color.as_ref()? {
-        ColorImage::Rgb(image) if is_color(&image.pixels, &Pattern::default().yuyv(number, SIZE)) => None,
-        _ => Some("colour is not what was sent".into()),
-    })
+    if let Some(depth) = &frame.depth {
+        same("depth", &depth.values, &Pattern::default().depth(number, SIZE))?;
+    }
+    match &frame.color {
+        None => Ok(Some(number)),
+        Some(ColorImage::Rgb(image)) if is_color(&image.pixels, &Pattern::default().yuyv(number, SIZE)) => {
+            Ok(Some(number))
+        }
+        Some(_) => Err("colour is not what was sent".into()),
+    }
 }
 
 fn is_color(pixels: &[[u8; 3]], bytes: &[u8]) -> bool {

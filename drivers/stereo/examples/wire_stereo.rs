@@ -22,7 +22,7 @@ use std::{
 
 use toile_capture::{ColorImage, DepthImage, Frame, RgbImage};
 use toile_driver_models::{
-    proof::{self, difference},
+    proof::{self, Shown, same},
     side_by_side::{self, Views},
     uvc::Wire,
     vhci,
@@ -53,7 +53,7 @@ fn main() -> Outcome<()> {
         }
         ["check", folder, take, count] => {
             let sent = sent(Path::new(folder))?;
-            println!("{}", proof::take(Path::new(take), count.parse()?, |frame| differs(frame, &sent))?);
+            println!("{}", proof::take(Path::new(take), count.parse()?, |frame| shown(frame, &sent))?);
         }
         _ => return Err("write FOLDER | serve FOLDER | check FOLDER TAKE COUNT".into()),
     }
@@ -158,12 +158,13 @@ fn grey(y: u8) -> [u8; 3] {
     [((298 * (i32::from(y) - 16) + 128) >> 8).clamp(0, 255) as u8; 3]
 }
 
-/// How a frame differs from what the model sent under the kernel's number of it.
-fn differs(frame: &Frame, sent: &[(DepthImage, RgbImage)]) -> Option<String> {
+/// A frame beside what the model sent under the kernel's number of it.
+fn shown(frame: &Frame, sent: &[(DepthImage, RgbImage)]) -> Shown {
     let (depth, colors) = &sent[(frame.device_frame % FRAMES) as usize];
     let (Some(seen), Some(ColorImage::Rgb(image))) = (&frame.depth, &frame.color) else {
-        return Some("depth or colour is missing".into());
+        return Err("depth or colour is missing".into());
     };
-    let color = difference("colour", &image.pixels, &colors.pixels);
-    color.or_else(|| difference("depth", &seen.values, &depth.values))
+    same("colour", &image.pixels, &colors.pixels)?;
+    same("depth", &seen.values, &depth.values)?;
+    Ok(Some(frame.device_frame))
 }
