@@ -2,7 +2,7 @@
 
 # libfreenect's own test prints a line for each depth and video frame.
 if [ -x "$rig/root/usr/bin/freenect-camtest" ]; then
-    LD_LIBRARY_PATH="$libraries" timeout 120 "$rig/root/usr/bin/freenect-camtest" > /run/camtest 2>&1 & client=$!
+    LD_LIBRARY_PATH="$libraries" timeout -k 30 120 "$rig/root/usr/bin/freenect-camtest" > /run/camtest 2>&1 & client=$!
     for _ in $(seq 100); do
         [ "$(grep -c 'depth frame' /run/camtest)" -ge 10 ] && [ "$(grep -c 'video frame' /run/camtest)" -ge 10 ] && break
         sleep 1
@@ -12,7 +12,7 @@ if [ -x "$rig/root/usr/bin/freenect-camtest" ]; then
     depth=$(grep -c 'depth frame' /run/camtest) video=$(grep -c 'video frame' /run/camtest)
     lost=$(grep -ci 'lost' /run/camtest)
     tail -5 /run/camtest
-    [ "$depth" -ge 10 ] && [ "$video" -ge 10 ] && streamed=yes || streamed=no
+    [ "$depth" -ge 10 ] && [ "$video" -ge 10 ] && streamed=0 || streamed=124
     verdict freenect-camtest $streamed "$depth depth and $video video frames, $lost reports of lost packets"
 else
     echo "FIDELITY freenect-camtest SKIPPED: libfreenect-bin cannot be downloaded" | said
@@ -22,7 +22,7 @@ fi
 gone 02ae
 if load gspca_kinect; then
     serve 02ae 1 "$bin/examples/wire_kinect1" serve
-    if said_by=$("$bin/examples/wire_kinect1" gspca "$(find /dev -name 'video*' | head -1)" 10 2>&1); then streamed=yes; else streamed=no; fi
+    if said_by=$("$bin/examples/wire_kinect1" gspca "$(find /dev -name 'video*' | head -1)" 10 2>&1); then streamed=0; else streamed=1; fi
     verdict gspca_kinect $streamed "$said_by"
     gone 02ae
     load -r gspca_kinect
