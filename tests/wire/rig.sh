@@ -4,9 +4,8 @@
 # fetch anew, remove that folder.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-rig=${WIRE_RIG:-$here/../../target/outside/wire}
+rig=$(cd "$here/../.." && pwd)/target/outside/wire
 mkdir -p "$rig/debs" "$rig/root" "$rig/kern"
-rig=$(cd "$rig" && pwd)
 # All downloads together may take so many seconds, those of the clients as many more.
 limit=600
 
