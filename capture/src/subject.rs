@@ -236,7 +236,8 @@ impl Subject {
         layer.garment = garment.filter(|_| layer.number > 0).or(layer.garment);
         let path = self.retake_path(&layer);
         if path.exists() {
-            fs::remove_file(&path).map_err(|error| CaptureError::io(&path, error))?;
+            // Recorded, but never accepted (the program ended between): nothing that was captured is lost.
+            self.reject(&path, &layer)?;
         }
         Ok(PendingTake { layer, path, retake: true })
     }

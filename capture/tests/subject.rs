@@ -75,7 +75,10 @@ fn a_killed_import_is_completed_on_opening() {
     let mut reopened = Subject::open(temp.path()).unwrap();
     assert_eq!(reopened.layers()[1].label(), "01-skirt", "recorded, but not yet in subject.toml");
     add(&mut reopened, "coat", 1);
+    // One that was recorded, but never accepted, is kept too.
+    record_frames(&reopened.retake("skirt", None).unwrap().path, 3, 1, 4000);
     let take = reopened.retake("skirt", None).unwrap();
+    assert!(temp.path().join("takes/rejected/01-skirt.1.mcap").is_file() && !take.path.exists());
     record_frames(&take.path, 4, 1, 4000);
     let path = reopened.take_path(&take.layer);
     fs::rename(&path, temp.path().join("takes/moved-away")).unwrap();

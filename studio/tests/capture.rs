@@ -60,6 +60,22 @@ fn a_take_ends_after_its_seconds_and_a_retake_of_its_replay_is_the_same() {
 }
 
 #[test]
+fn a_damaged_recording_is_recorded_again_as_far_as_it_goes_and_that_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("torn.mcap");
+    let progress = Progress::new(true);
+    record(kinect(Vec::new()), &path, (Stop::After(0.5), Pace::Live), &AtomicBool::new(false), &progress).unwrap();
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    let (subject, device) = (dir.path().join("olga"), format!("replay:{}", path.display()));
+    let mut again = toile();
+    again.args(["capture", "--layer", "body", "--device", &device, "--subject"]).arg(&subject);
+    let told = exits(3, &mut again);
+    assert!(told["lost"][0].as_str().unwrap().contains("torn.mcap"), "{told}");
+    assert!(!frames(&subject.join("takes/00-body.mcap")).is_empty());
+}
+
+#[test]
 fn ctrl_c_finishes_the_file() {
     let dir = tempfile::tempdir().unwrap();
     let subject = dir.path().join("olga");

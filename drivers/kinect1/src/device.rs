@@ -7,7 +7,7 @@ use toile_capture::{
     host_now_ns,
     pairing::{Pair, Pairing},
 };
-use toile_driver_transport::{Bus, DeviceInfo, Transfer, TransferStatus, TransportError, UsbDevice};
+use toile_driver_transport::{Bus, DeviceInfo, Transfer, TransferStatus, TransportError, UsbDevice, choose};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use crate::{
@@ -93,9 +93,7 @@ impl Kinect1 {
     /// # Errors
     /// [`Kinect1Error`] where there is none, it may not be opened, or its firmware does not answer as it should.
     pub fn open(bus: &dyn Bus, serial: Option<&str>, settings: Settings) -> Result<Self, Kinect1Error> {
-        let found = list(bus)?.into_iter().find(|(_, its)| serial.is_none_or(|wanted| wanted == its));
-        let what = || serial.map_or("a Kinect v1".to_string(), |s| format!("a Kinect v1 with serial number {s}"));
-        let (info, serial) = found.ok_or_else(|| TransportError::NotFound { what: what() })?;
+        let (info, serial) = choose(bus, list(bus)?, "a Kinect v1", serial)?;
         let mut device = bus.open(&info)?;
         // The Kinect for Windows streams in its first alternate setting only (libfreenect `fnusb_claim_camera`).
         device.claim(0, u8::from(info.product == KINECT_FOR_WINDOWS))?;

@@ -7,7 +7,7 @@ use toile_capture::{
     host_now_ns,
     pairing::{Pair, Pairing},
 };
-use toile_driver_transport::{Bus, DeviceInfo, LinkSpeed, Transfer, TransferStatus, TransportError, UsbDevice};
+use toile_driver_transport::{Bus, DeviceInfo, LinkSpeed, Transfer, TransferStatus, TransportError, UsbDevice, choose};
 use toile_geometry::Rigid;
 
 use crate::{
@@ -92,9 +92,7 @@ impl Kinect2 {
     /// # Errors
     /// [`Kinect2Error`] where there is none, it may not be opened, or its firmware does not answer as it should.
     pub fn open(bus: &dyn Bus, serial: Option<&str>, settings: Settings) -> Result<Self, Kinect2Error> {
-        let found = list(bus)?.into_iter().find(|(_, its)| serial.is_none_or(|wanted| wanted == its));
-        let what = || serial.map_or("a Kinect v2".to_string(), |s| format!("a Kinect v2 with serial number {s}"));
-        let (info, _) = found.ok_or_else(|| TransportError::NotFound { what: what() })?;
+        let (info, _) = choose(bus, list(bus)?, "a Kinect v2", serial)?;
         if matches!(info.speed, LinkSpeed::Full | LinkSpeed::High) {
             return Err(Kinect2Error::SlowLink);
         }

@@ -301,7 +301,7 @@ fn choose(video: &dyn Video, serial: Option<&str>) -> Result<(Camera, Details), 
     let mut why = None;
     for camera in find::list(video)? {
         let Some(nodes) = &camera.depth else {
-            why = Some(RealsenseError::NoNode("depth"));
+            why = Some(find::refusal(video, &camera).map_or(RealsenseError::NoNode("depth"), RealsenseError::from));
             continue;
         };
         let asked = video.open(&nodes.pictures).map_err(RealsenseError::from);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 use toile_driver_transport::{
-    LinkSpeed,
+    LinkSpeed, TransportError,
     known::{self, Family},
     video::{FourCc, UsbPlace, Video},
 };
@@ -52,7 +52,8 @@ impl Camera {
     }
 }
 
-/// The cameras that are plugged in, in the order of their first nodes. Nodes that cannot be opened are left out.
+/// The cameras that are plugged in, in the order of their first nodes. Nodes that cannot be opened are left out
+/// ([`refusal`] tells why).
 ///
 /// # Errors
 /// [`RealsenseError::Transport`] where nodes cannot be listed at all.
@@ -63,14 +64,14 @@ pub fn list(video: &dyn Video) -> Result<Vec<Camera>, RealsenseError> {
     for info in video.list()? {
         let Some(place) = info.usb else { continue };
         let Some(name) = name(&place) else { continue };
-        let Ok(node) = video.open(&info.node) else {
-            last = None;
-            continue;
-        };
         let index = cameras.iter().position(|c| c.address == place.address).unwrap_or_else(|| {
             cameras.push(camera(name, &place));
             cameras.len() - 1
         });
+        let Ok(node) = video.open(&info.node) else {
+            last = None;
+            continue;
+        };
         let camera = &mut cameras[index];
         if node.is_metadata() {
             if let Some((address, interface, part)) = last.take()
@@ -87,6 +88,13 @@ pub fn list(video: &dyn Video) -> Result<Vec<Camera>, RealsenseError> {
         }
     }
     Ok(cameras)
+}
+
+/// Why a node of this camera cannot be opened; `None` where all can.
+pub fn refusal(video: &dyn Video, camera: &Camera) -> Option<TransportError> {
+    let nodes = video.list().unwrap_or_default().into_iter();
+    let its = nodes.filter(|info| info.usb.as_ref().is_some_and(|usb| usb.address == camera.address));
+    its.map(|info| video.open(&info.node)).find_map(Result::err)
 }
 
 /// What a node shows.

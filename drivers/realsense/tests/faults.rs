@@ -3,7 +3,7 @@
 
 mod common;
 
-use std::time::Instant;
+use std::{path::Path, time::Instant};
 
 use common::{color_fault, depth_fault, faulty, has_color_of, has_depth_of, pattern, plugged, settings};
 use toile_capture::Source;
@@ -13,7 +13,10 @@ use toile_driver_models::{
     uvc::{StreamFault, Wire},
 };
 use toile_driver_realsense::{Health, Realsense};
-use toile_driver_transport::video::twin::VirtualVideo;
+use toile_driver_transport::{
+    TransportError, udev,
+    video::{NodeInfo, Video, VideoNode, twin::VirtualVideo},
+};
 
 /// Frame 2's depth is spoilt by a fault: it comes with colour alone, its neighbours are whole.
 fn spoils_frame_2(wire: Wire, what: StreamFault, packet: usize) -> Health {
@@ -208,4 +211,24 @@ fn firmware_that_is_starting_is_waited_for() {
     model.scene().monitor.fault = Some(MonitorFault::NotReady(2));
     let (bus, ..) = plugged(model);
     assert!(Realsense::open(&VirtualVideo::new(bus), None, settings()).unwrap().next_frame().unwrap().is_some());
+}
+
+/// Nodes that may not be opened.
+struct Locked(VirtualVideo);
+
+impl Video for Locked {
+    fn list(&self) -> Result<Vec<NodeInfo>, TransportError> {
+        self.0.list()
+    }
+
+    fn open(&self, node: &Path) -> Result<Box<dyn VideoNode>, TransportError> {
+        Err(TransportError::NodePermission { node: node.into(), advice: udev::advice(0x8086) })
+    }
+}
+
+#[test]
+fn a_camera_that_may_not_be_opened_is_told_with_the_rule() {
+    let (bus, ..) = plugged(pattern(Wire::Bulk));
+    let error = Realsense::open(&Locked(VirtualVideo::new(bus)), None, settings()).err().unwrap().to_string();
+    assert!(error.contains("permission") && error.contains("idVendor}==\"8086\""), "{error}");
 }

@@ -38,6 +38,9 @@ pub enum Cameras {
     },
 }
 
+/// Columns and rows that no camera's view exceeds.
+const MOST_PIXELS: u32 = 16_384;
+
 /// A stereo rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -95,8 +98,11 @@ impl StereoCamera {
     /// # Errors
     /// [`StereoDriverError`] names the node, file or setting.
     pub fn open(video: &dyn Video, settings: &StereoSettings) -> Result<Self, StereoDriverError> {
-        let calibration = read_calibration(&settings.calibration, settings.metres_per_unit)?;
         let StereoSettings { width, height, fps, .. } = *settings;
+        if width.max(height) > MOST_PIXELS {
+            return Err(StereoDriverError::Size { width, height });
+        }
+        let calibration = read_calibration(&settings.calibration, settings.metres_per_unit)?;
         let pairs: Box<dyn Pairs> = match &settings.cameras {
             Cameras::SideBySide { node } => {
                 Box::new(SideBySide::new(NodePictures::open(video, node, Side::Left, (2 * width, height))?))

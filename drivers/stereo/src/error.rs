@@ -25,6 +25,14 @@ pub enum StereoDriverError {
         /// Rows asked for.
         height: u32,
     },
+    /// The settings tell pictures larger than any camera's.
+    #[error("`width` and `height` are {width} and {height}, but no camera has more than 16384; give those of one view")]
+    Size {
+        /// Columns of a view.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
     /// A picture is not whole. The one after it may be.
     #[error("the {side} camera's picture {sequence} {reason}")]
     Picture {

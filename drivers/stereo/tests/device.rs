@@ -271,3 +271,11 @@ fn true_depth(rectified_from_left: &Matrix3<f64>, ray: Vector2<f64>) -> f64 {
     let direction = rectified_from_left.transpose() * Vector3::new(ray.x, ray.y, 1.0);
     (rectified_from_left * scene::hit(Point3::origin(), direction).coords).z
 }
+
+#[test]
+fn settings_of_impossible_size_are_refused() {
+    let video = VirtualVideo::new(VirtualBus::default());
+    let chosen = StereoSettings { width: u32::MAX, ..settings() };
+    let error = StereoCamera::open(&video, &chosen).err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(error.contains("4294967295") && error.contains("one view"), "{error}");
+}

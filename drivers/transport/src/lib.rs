@@ -29,6 +29,6 @@ pub mod udev;
 pub mod usb;
 pub mod video;
 
-pub use bus::{Bus, DeviceInfo, LinkSpeed, Setup, UsbDevice, open_known, wait_for};
+pub use bus::{Bus, DeviceInfo, LinkSpeed, Setup, UsbDevice, choose, open_known, wait_for};
 pub use error::TransportError;
 pub use transfer::{PacketStatus, Transfer, TransferKind, TransferStatus};

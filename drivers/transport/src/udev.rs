@@ -1,6 +1,9 @@
 //! The udev rule that lets a logged-in user open the cameras.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use crate::{TransportError, known};
 
@@ -10,15 +13,22 @@ pub const RULE_FILE: &str = "60-toile.rules";
 /// Where rules of the local administrator belong.
 pub const RULES_FOLDER: &str = "/etc/udev/rules.d";
 
-/// Text of the rule for every known vendor: USB nodes and their video nodes.
-pub fn rules() -> String {
+/// Text of the rule for every known vendor and those of cameras that are `plugged` in: USB nodes and their video nodes.
+pub fn rules(plugged: &[u16]) -> String {
     let mut text = String::from("# Depth cameras that Toile uses; gives the user at the seat access.\n");
-    known::vendors().into_iter().for_each(|vendor| text.push_str(&rule(vendor)));
+    let vendors: BTreeSet<u16> = known::vendors().into_iter().chain(plugged.iter().copied()).collect();
+    vendors.into_iter().for_each(|vendor| text.push_str(&rule(vendor)));
     text
 }
 
-/// What to do where a vendor's camera may not be opened: the exact rule, and how to install it.
+/// What to do where a vendor's camera may not be opened: the exact rule, and how to install it; for a camera that is not
+/// on USB (vendor 0) the group.
 pub fn advice(vendor: u16) -> String {
+    if vendor == 0 {
+        return "It is on no USB device that a rule could name: add yourself to the group of its node \
+                (`sudo usermod -aG video $USER`), then log in again."
+            .into();
+    }
     format!(
         "Run `sudo toile devices --install-udev-rules`, which writes {RULES_FOLDER}/{RULE_FILE}, then plug it in again. \
          The rule:\n{}",
@@ -33,13 +43,13 @@ fn rule(vendor: u16) -> String {
     )
 }
 
-/// Writes the rule into `folder` and returns the file.
+/// Writes the rule, also for the vendors of cameras that are `plugged` in, into `folder` and returns the file.
 ///
 /// # Errors
 /// [`TransportError::Rule`] where the folder cannot be written.
-pub fn install(folder: &Path) -> Result<PathBuf, TransportError> {
+pub fn install(folder: &Path, plugged: &[u16]) -> Result<PathBuf, TransportError> {
     let path = folder.join(RULE_FILE);
-    std::fs::write(&path, rules()).map_err(|source| TransportError::Rule { path: path.clone(), source })?;
+    std::fs::write(&path, rules(plugged)).map_err(|source| TransportError::Rule { path: path.clone(), source })?;
     Ok(path)
 }
 
@@ -49,7 +59,7 @@ mod tests {
 
     #[test]
     fn every_vendor_has_a_usb_and_a_video_rule() {
-        let text = rules();
+        let text = rules(&[]);
         for vendor in known::vendors() {
             let lines = text.lines().filter(|l| l.contains(&format!("\"{vendor:04x}\""))).count();
             assert_eq!(lines, 2);
@@ -59,11 +69,13 @@ mod tests {
     #[test]
     fn the_installed_file_is_the_rule_and_a_refusal_prints_it() {
         let folder = tempfile::tempdir().unwrap();
-        let path = install(folder.path()).unwrap();
+        let path = install(folder.path(), &[0x32e4]).unwrap();
         assert_eq!(
             (path.file_name().unwrap().to_str(), std::fs::read_to_string(&path).unwrap()),
-            (Some(RULE_FILE), rules())
+            (Some(RULE_FILE), rules(&[0x32e4]))
         );
+        assert!(rules(&[0x32e4]).contains("32e4") && !rules(&[]).contains("32e4"));
+        assert!(advice(0).contains("group") && !advice(0).contains("0000"));
         let device = crate::DeviceInfo {
             vendor: 0x045e,
             product: 0x02ae,
@@ -79,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_folder_that_is_not_there_is_named() {
-        let error = install(Path::new("no/such/folder")).unwrap_err().to_string();
+        let error = install(Path::new("no/such/folder"), &[]).unwrap_err().to_string();
         assert!(error.contains("no/such/folder") && error.contains("root"), "{error}");
     }
 }

@@ -82,6 +82,15 @@ impl Device {
         }
     }
 
+    /// What a recording lost before it came here (torn or damaged), in words.
+    ///
+    /// # Errors
+    /// [`StudioError`] where it cannot be read at all.
+    pub fn damage(&self) -> Result<Option<String>, StudioError> {
+        let Self::Replay(file) = self else { return Ok(None) };
+        Ok(Replay::open(file)?.lost().map(|lost| format!("{}: {lost}", file.display())))
+    }
+
     /// Opens it for a take of `subject` that will be `layer`.
     ///
     /// # Errors

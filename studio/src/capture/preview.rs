@@ -62,6 +62,16 @@ struct State {
     over: bool,
 }
 
+/// Says that nobody takes frames any more, also where fusing panics: the recording goes on.
+struct Over(Arc<Shared>);
+
+impl Drop for Over {
+    fn drop(&mut self) {
+        self.0.lock().over = true;
+        self.0.changed.notify_all();
+    }
+}
+
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
@@ -92,9 +102,8 @@ impl Preview {
         let its = shared.clone();
         let room = ROOM * rig.sensors.len().max(1);
         let run = move || {
-            follow(&rig, &its);
-            its.lock().over = true;
-            its.changed.notify_all();
+            let over = Over(its);
+            follow(&rig, &over.0);
         };
         let thread = thread::Builder::new().name("preview".into()).spawn(run)?;
         Ok(Self { shared, thread: Some(thread), pace, room })

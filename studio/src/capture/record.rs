@@ -135,7 +135,10 @@ impl Take {
                     in_a_row = 0;
                     self.write(frame, path)?;
                 }
-                Ok(Err(CaptureError::Device { device, reason })) => ended.failed = Some(format!("{device}: {reason}")),
+                Ok(Err(CaptureError::Device { device, reason })) => {
+                    let before = ended.failed.take().map_or(String::new(), |before| before + "; ");
+                    ended.failed = Some(format!("{before}{device}: {reason}"));
+                }
                 Ok(Err(error)) => {
                     in_a_row += 1;
                     ended.broken.push(error.to_string());

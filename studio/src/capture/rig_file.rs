@@ -62,6 +62,15 @@ impl RigFile {
         if is_live { Pace::Live } else { Pace::OnDemand }
     }
 
+    /// What its recordings lost before they came here, a sentence each.
+    ///
+    /// # Errors
+    /// [`StudioError`] where one cannot be read at all.
+    pub fn damage(&self) -> Result<Vec<String>, StudioError> {
+        let told = self.sensors.iter().map(|placed| placed.device.damage());
+        told.filter_map(Result::transpose).collect()
+    }
+
     /// Opens all sensors for a take of `subject` that will be `layer`.
     ///
     /// # Errors
@@ -90,7 +99,11 @@ fn parse(text: &str) -> Result<Vec<Placed>, String> {
         let rig_from_depth = Rigid::new(sensor.position.into(), rotation.into());
         Ok(Placed { device: sensor.device.parse()?, name: sensor.name, rig_from_depth })
     };
-    file.sensor.into_iter().map(placed).collect()
+    let sensors: Vec<Placed> = file.sensor.into_iter().map(placed).collect::<Result<_, _>>()?;
+    if sensors.iter().any(|s| s.device.pace() != sensors[0].device.pace()) {
+        return Err("cameras do not wait for recordings or the virtual sensor; put them into rigs of their own".into());
+    }
+    Ok(sensors)
 }
 
 #[cfg(test)]
@@ -117,6 +130,7 @@ mod tests {
             ("sensor = []", "no [[sensor]]"),
             ("[[sensor]]\ndevice = \"kinect9\"", "choose of"),
             ("[[sensor]]\ndevice = \"kinect1\"\nplace = 1", "place"),
+            ("[[sensor]]\ndevice = \"kinect1\"\n[[sensor]]\ndevice = \"synthetic\"", "rigs of their own"),
             ("[[sensor]]\ndevice = \"kinect1\"\nposition = [nan, 0.0, 0.0]", "finite"),
         ] {
             assert!(parse(text).unwrap_err().contains(words), "{text}");

@@ -75,7 +75,12 @@ impl Capture {
             remove_empty(&self.subject);
         }
         let (recorded, take, kept) = captured?;
-        Ok(self.answer(&recorded, &take, kept))
+        let mut answer = self.answer(&recorded, &take, kept);
+        answer.lost.extend(match &self.rig {
+            Some(file) => RigFile::read(file)?.damage()?,
+            None => self.device.damage()?.into_iter().collect(),
+        });
+        Ok(answer)
     }
 
     fn capture(

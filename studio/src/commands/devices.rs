@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use toile_driver_realsense as realsense;
 use toile_driver_stereo::{self as stereo, nodes::WideNode};
 use toile_driver_transport::{
+    TransportError,
     known::{self, Family},
     udev,
     usb::{self, UsbCamera},
@@ -47,7 +48,10 @@ impl Devices {
 }
 
 fn install() -> Result<Answer, StudioError> {
-    let path = udev::install(Path::new(udev::RULES_FOLDER)).map_err(|e| StudioError::Device(e.to_string()))?;
+    let nodes = KernelVideo::default().list().unwrap_or_default();
+    let vendors: Vec<u16> = nodes.into_iter().filter_map(|node| Some(node.usb?.id.0)).collect();
+    let path =
+        udev::install(Path::new(udev::RULES_FOLDER), &vendors).map_err(|e| StudioError::Device(e.to_string()))?;
     let text =
         format!("{}\nRun `udevadm control --reload` (as root), then plug the cameras in again.\n", path.display());
     Ok(Answer { text, results: json!({ "rule": path }), ..Answer::default() })
@@ -72,7 +76,11 @@ fn tell(mut answer: Answer, usb: &[UsbCamera], webcams: Vec<(u32, String)>, vide
     let is_new = |(index, _): &(u32, String)| !told.contains(Path::new(&format!("/dev/video{index}")));
     let webcams: Vec<(u32, String)> = webcams.into_iter().filter(is_new).collect();
     answer.text = text(usb, &cameras, &nodes, &wide, &webcams);
-    answer.warnings.extend(cameras.iter().filter_map(missing_nodes));
+    let refused = refused(video);
+    if refused.is_empty() {
+        answer.warnings.extend(cameras.iter().filter_map(missing_nodes));
+    }
+    answer.warnings.extend(refused);
     for camera in usb {
         answer.warnings.extend(camera.problems.iter().map(|p| format!("{}: {p}", camera.name)));
     }
@@ -96,6 +104,19 @@ fn nodes_told_already(video: &dyn Video) -> BTreeSet<PathBuf> {
     let is_metadata = |info: &NodeInfo| video.open(&info.node).is_ok_and(|node| node.is_metadata());
     let nodes = video.list().unwrap_or_default().into_iter();
     nodes.filter(|info| is_driven(info) || is_metadata(info)).map(|info| info.node).collect()
+}
+
+/// Nodes that may not be opened, with what to do; once for a camera.
+fn refused(video: &dyn Video) -> Vec<String> {
+    let mut told = BTreeSet::new();
+    let nodes = video.list().unwrap_or_default().into_iter();
+    let refused = nodes.filter_map(|info| match video.open(&info.node) {
+        Err(error @ TransportError::NodePermission { .. }) => {
+            Some((info.usb.map(|usb| usb.address), error.to_string()))
+        }
+        _ => None,
+    });
+    refused.filter(|(address, _)| address.is_none() || told.insert(*address)).map(|(_, words)| words).collect()
 }
 
 fn warn<T>(answer: &mut Answer, error: &dyn std::fmt::Display) -> Vec<T> {

@@ -133,6 +133,7 @@ impl UsbDevice for LibusbDevice {
                 self.gone |= transfer.status == TransferStatus::Unplugged;
                 Ok(transfer)
             }
+            Err(_) if self.gone && self.in_flight() == 0 => Err(TransportError::Unplugged),
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
                 Err(TransportError::TimedOut { what: "waiting for a transfer".into(), waited: limit })
             }

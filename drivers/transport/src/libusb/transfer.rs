@@ -142,12 +142,13 @@ extern "system" fn finished(pointer: *mut libusb_transfer) {
     let mut flight = unsafe { Box::from_raw((*pointer).user_data.cast::<Flight>()) };
     // SAFETY: the transfer is done: libusb does not write to it any more, and it is freed only below.
     unsafe { take_results(pointer, &mut flight.transfer) };
-    flight.shared.flights.remove(flight.number);
+    let Flight { transfer, shared, done, number } = *flight;
+    // Sent before it is off the list: where none is in flight, all have come. Nobody waits any more when the device was
+    // dropped.
+    drop(done.send(transfer));
+    shared.flights.remove(number);
     // SAFETY: the pointer was taken off the list under its lock, so nobody cancels it (*listed*).
     unsafe { libusb_free_transfer(pointer) };
-    let Flight { transfer, shared, done, .. } = *flight;
-    // Nobody waits any more when the device was dropped.
-    drop(done.send(transfer));
     drop(shared);
 }
 

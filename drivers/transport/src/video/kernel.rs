@@ -6,6 +6,7 @@
 use std::{
     ffi::c_void,
     io, mem,
+    os::unix::ffi::OsStrExt,
     path::{Path, PathBuf},
     ptr,
     time::Duration,
@@ -33,7 +34,6 @@ const GET_CUR: u8 = 0x81;
 /// `_IOWR('u', 0x21, struct uvc_xu_control_query)` with its 16 bytes.
 const UVCIOC_CTRL_QUERY: vidioc::_IOC_TYPE = (3 << 30) | (16 << 16) | (0x75 << 8) | 0x21;
 /// Errors as Linux numbers them.
-const EACCES: i32 = 13;
 const ENODEV: i32 = 19;
 const EPIPE: i32 = 32;
 const EREMOTEIO: i32 = 121;
@@ -71,7 +71,7 @@ impl Video for KernelVideo {
             nodes.into_iter().find(|n| n.node == node).and_then(|n| n.usb).map_or(0, |usb| usb.id.0)
         };
         match KernelNode::open(node) {
-            Err(TransportError::Video { source, .. }) if source.raw_os_error() == Some(EACCES) => {
+            Err(TransportError::Video { source, .. }) if source.kind() == io::ErrorKind::PermissionDenied => {
                 Err(TransportError::NodePermission { node: node.into(), advice: udev::advice(vendor()) })
             }
             other => Ok(Box::new(other?)),
@@ -90,6 +90,10 @@ struct KernelNode {
 impl KernelNode {
     fn open(node: &Path) -> Result<Self, TransportError> {
         let failed = |action| move |source| TransportError::from_video(node, action, source);
+        // `v4l` panics on it.
+        if node.as_os_str().as_bytes().contains(&0) {
+            return Err(failed("open it")(io::ErrorKind::InvalidInput.into()));
+        }
         let device = Device::with_path(node).map_err(failed("open it"))?;
         let about = device.query_caps().map_err(failed("ask what it is"))?;
         let is_metadata = about.capabilities.contains(META_CAPTURE_FLAG);

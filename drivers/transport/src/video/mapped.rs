@@ -68,9 +68,12 @@ impl Mapped {
         loop {
             let left = limit.saturating_sub(start.elapsed());
             let milliseconds = i32::try_from(left.as_millis()).unwrap_or(i32::MAX);
-            if self.handle.poll(POLLIN, milliseconds)? == 0 {
-                return Err(io::ErrorKind::TimedOut.into());
-            }
+            match self.handle.poll(POLLIN, milliseconds) {
+                Ok(0) => return Err(io::ErrorKind::TimedOut.into()),
+                // A signal (Ctrl-C is one) is no end of the stream.
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                ready => ready?,
+            };
             if let Some(buffer) = self.take()? {
                 return Ok(buffer);
             }
