@@ -25,15 +25,19 @@ pub fn host_now_ns() -> i64 {
 
 /// The device's clock may run away from the host's by this much, parts of one: quartz clocks keep to 100 ppm.
 const DRIFT: f64 = 200e-6;
+/// A difference of the clocks that changes by more did so because a device's time is wrong or began anew.
+const JUMP_NS: u64 = 2_000_000_000;
 
 /// Host time of frames by the device's clock: without the jitter of their arrival, and without drift.
 ///
 /// A frame arrives late by the bus and the scheduler, never early. The smallest difference of arrival and device time
-/// is therefore the best one; it may grow by 200 ppm, so that a device clock that runs slow is followed too.
+/// is therefore the best one; it may grow by 200 ppm, so that a device clock that runs slow is followed too. One frame
+/// whose time is wrong by seconds is not learnt from; with the second in a row the fit begins anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ClockFit {
-    /// Device time and host time minus device time, at the last frame.
+    /// Device time and host time minus device time, at the last frame that was believed.
     last: Option<(i64, i64)>,
+    is_doubted: bool,
 }
 
 impl ClockFit {
@@ -41,12 +45,20 @@ impl ClockFit {
     pub fn host_time_ns(&mut self, device_ns: i64, arrival_ns: i64) -> i64 {
         let seen = arrival_ns.saturating_sub(device_ns);
         let offset = match self.last {
+            Some((_, offset)) if seen.abs_diff(offset) > JUMP_NS => {
+                if !self.is_doubted {
+                    self.is_doubted = true;
+                    return device_ns.saturating_add(offset).min(arrival_ns);
+                }
+                seen
+            }
             Some((before, offset)) => {
                 let grown = (device_ns.saturating_sub(before).max(0) as f64 * DRIFT) as i64;
                 seen.min(offset.saturating_add(grown))
             }
             None => seen,
         };
+        self.is_doubted = false;
         self.last = Some((device_ns, offset));
         device_ns.saturating_add(offset)
     }
@@ -74,5 +86,24 @@ mod tests {
             // After eleven minutes as at the start: within what the clock can grow between the best arrivals.
             assert!(errors_after(ppm).iter().all(|e| (-1_000..500_000).contains(e)), "{ppm}");
         }
+    }
+
+    /// Host times of frames that arrive each 33 ms, whose device times have these errors, minus their arrivals; ns.
+    fn lateness(device_errors: [i64; 5]) -> Vec<i64> {
+        let mut fit = ClockFit::default();
+        let arrivals = (0..).map(|k| 1_700_000_000_000_000_000 + k * 33_000_000);
+        let times = device_errors.iter().zip(arrivals);
+        times
+            .map(|(error, arrival)| fit.host_time_ns(arrival - 1_600_000_000_000_000_000 + error, arrival) - arrival)
+            .collect()
+    }
+
+    #[test]
+    fn one_wrong_device_time_is_not_learnt_and_a_clock_that_begins_anew_is() {
+        const T: i64 = 20_000_000_000;
+        assert_eq!(lateness([0, 0, T, 0, 0]), [0; 5]);
+        assert_eq!(lateness([0, 0, -T, 0, 0]), [0, 0, -T, 0, 0]);
+        assert_eq!(lateness([0, 0, T, T, T]), [0; 5]);
+        assert_eq!(lateness([0, 0, -T, -T, -T]), [0, 0, -T, 0, 0]);
     }
 }
