@@ -8,7 +8,7 @@ use toile_driver_transport::{
     video::{Video, VideoBuffer, VideoNode},
 };
 
-use crate::{UvcDepthError, calibration, decode, decode::Layout, nodes::depth_format};
+use crate::{UvcDepthError, calibration, decode, decode::Layout, nodes::depth_format, numbering::Numbering};
 
 /// How to stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,7 +48,7 @@ pub struct UvcDepthCamera {
     settings: Settings,
     rig: Rig,
     health: Health,
-    last_sequence: Option<u32>,
+    numbering: Numbering,
     /// No frame came since the stream was switched off and on.
     is_last_try: bool,
     ended: bool,
@@ -88,7 +88,7 @@ impl UvcDepthCamera {
             settings,
             rig: Rig { sensors: vec![sensor] },
             health: Health::default(),
-            last_sequence: None,
+            numbering: Numbering::default(),
             is_last_try: false,
             ended: false,
         })
@@ -107,7 +107,8 @@ impl UvcDepthCamera {
                     return Err(UvcDepthError::Silent(self.settings.frame_limit.as_secs_f64()));
                 }
                 Err(TransportError::TimedOut { .. }) => {
-                    (self.is_last_try, self.last_sequence) = (true, None);
+                    self.is_last_try = true;
+                    self.numbering.restart();
                     self.health.restarts += 1;
                     self.node.stop();
                     self.node.start(self.settings.buffers)?;
@@ -118,18 +119,16 @@ impl UvcDepthCamera {
     }
 
     fn frame(&mut self, buffer: &VideoBuffer) -> Result<Frame, UvcDepthError> {
-        // The kernel's counter is 32 bits wide and wraps; the difference does not mind.
-        let lost = self.last_sequence.map_or(0, |last| buffer.sequence.wrapping_sub(last).wrapping_sub(1));
-        self.last_sequence = Some(buffer.sequence);
-        self.health.lost += u64::from(lost);
+        let (number, lost) = self.numbering.count(buffer.sequence, buffer.time_ns);
+        self.health.lost += lost;
         self.is_last_try = false;
         let depth = decode::depth16(&buffer.bytes, self.layout)?;
         self.health.frames += 1;
         Ok(Frame {
             sensor: 0,
             index: self.health.frames - 1,
-            device_frame: u64::from(buffer.sequence),
-            lost_before: lost,
+            device_frame: number,
+            lost_before: u32::try_from(lost).unwrap_or(u32::MAX),
             device_time_ns: buffer.time_ns,
             host_time_ns: host_now_ns(),
             depth: Some(Arc::new(depth)),

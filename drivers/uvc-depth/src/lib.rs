@@ -10,6 +10,7 @@ pub mod decode;
 pub mod device;
 pub mod error;
 pub mod nodes;
+mod numbering;
 
 pub use device::{Health, Settings, UvcDepthCamera};
 pub use error::UvcDepthError;

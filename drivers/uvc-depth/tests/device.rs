@@ -110,6 +110,8 @@ fn a_camera_that_falls_silent_is_woken_once_and_then_told() {
         let (frames, error) = take(&mut woken, 6);
         assert!(error.is_none() && frames.len() == 6, "{what:?}: {error:?}");
         assert_eq!(woken.health().restarts, 1);
+        let told = frames.windows(2).map(|w| w[1].device_frame - w[0].device_frame - u64::from(w[1].lost_before));
+        assert!(told.into_iter().all(|step| step == 1), "{what:?}: numbers go on");
         let always: Vec<_> = (3..60).map(|frame| fault(frame, 4, what)).collect();
         let mut silent = camera(wire, &always);
         let (frames, error) = take(&mut silent, 6);
