@@ -3,6 +3,7 @@
 //! - [`Frame`]: depth and colour of one sensor at one time, with device and host time and the device's frame number;
 //! - [`Rig`] and [`Sensor`]: cameras, calibration, identity;
 //! - [`clock`]: which clock stamps frames, and its fit to the host's;
+//! - [`tick_clock`]: a device's ticks, which wrap, as a time that does not;
 //! - [`pairing`]: depth and colour of one time to one frame, for devices that send them apart;
 //! - [`Source`]: what live devices, replay and the synthetic sensor have in common;
 //! - [`Recorder`] writes frames to an MCAP file, [`Replay`] is the file as a source; [`depth_codec`] packs depth;
@@ -64,6 +65,7 @@ pub mod rig;
 mod schema;
 pub mod source;
 pub mod subject;
+pub mod tick_clock;
 pub mod trajectory;
 
 pub use atomic_write::{atomic_write, atomic_write_with};
@@ -77,4 +79,5 @@ pub use replay::{FrameInfo, Loss, Replay};
 pub use rig::{DeviceIdentity, Rig, Sensor};
 pub use source::Source;
 pub use subject::{Layer, PendingTake, Subject};
+pub use tick_clock::TickClock;
 pub use trajectory::TimedPose;

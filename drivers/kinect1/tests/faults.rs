@@ -101,6 +101,20 @@ fn a_silent_stream_is_woken_once_and_then_told() {
 }
 
 #[test]
+fn a_time_that_cannot_be_costs_its_picture_only() {
+    for ticks in [600_000_000, 3_000_000_000] {
+        let mut kinect = faulty(&[depth_fault(2, 0, StreamFault::Ticks(ticks))]);
+        let (frames, error) = take(&mut kinect, 6);
+        assert!(error.is_none(), "{error:?}");
+        for (frame, k) in frames.iter().zip(0..) {
+            assert_eq!((frame.device_frame, frame.lost_before), (k, 0), "{ticks}");
+            assert!(has_color_of(frame, k) && has_depth_of(frame, k) == (k != 2), "{ticks}: {k}");
+        }
+        assert_eq!(kinect.health().alone, [0, 1]);
+    }
+}
+
+#[test]
 fn an_unplug_gives_all_whole_frames_then_one_error_then_the_end() {
     let mut kinect = faulty(&[depth_fault(4, 100, StreamFault::Unplug)]);
     let (frames, error) = take(&mut kinect, 12);

@@ -157,6 +157,17 @@ fn a_silent_stream_is_woken_once_and_then_told() {
 }
 
 #[test]
+fn nonsense_numbers_lose_nothing_and_nonsense_times_their_picture_only() {
+    for (what, keeps) in [
+        (StreamFault::Sequence(1_000_000), true),
+        (StreamFault::Sequence(60), true),
+        (StreamFault::Ticks(160_000), false),
+    ] {
+        spoils_frame_2(depth_fault(2, 0, what), (keeps, true));
+    }
+}
+
+#[test]
 fn an_unplug_gives_all_whole_frames_then_one_error_then_the_end() {
     for fault in [depth_fault(3, 50, StreamFault::Unplug), color_fault(3, 1, StreamFault::Unplug)] {
         let mut kinect = faulty(&[fault]);

@@ -162,7 +162,10 @@ impl CameraModel {
             Some(StreamFault::Unplug) => return Packet::Gone,
             _ => {}
         }
-        let ticks = (frame * TICKS_PER_FRAME + delay * TICKS_PER_FRAME * FRAMES / MICROFRAMES) as u32;
+        let ticks = match fault {
+            Some(StreamFault::Ticks(ticks)) => ticks,
+            _ => (frame * TICKS_PER_FRAME + delay * TICKS_PER_FRAME * FRAMES / MICROFRAMES) as u32,
+        };
         let mut packet = packet(stream, bytes, index, sending.sequence, ticks);
         sending.sequence = sending.sequence.wrapping_add(1);
         match fault {
@@ -182,9 +185,12 @@ impl CameraModel {
             let length = match fault.what {
                 StreamFault::Lost(n) | StreamFault::Damaged(n) => n,
                 StreamFault::Late(_) => 0,
+                StreamFault::Ticks(_) => usize::MAX,
                 _ => 1,
             };
-            fault.stream == stream && fault.frame == frame && (fault.packet..fault.packet + length).contains(&index)
+            fault.stream == stream
+                && fault.frame == frame
+                && (fault.packet..fault.packet.saturating_add(length)).contains(&index)
         };
         self.faults.iter().find(hits).map(|fault| fault.what)
     }

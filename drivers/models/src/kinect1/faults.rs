@@ -34,6 +34,8 @@ pub enum StreamFault {
     BadMagic,
     /// The packet's header says what it is not.
     BadFlag,
+    /// The camera tells this time instead of the frame's, ticks.
+    Ticks(u32),
     /// Nothing comes any more.
     Silent,
     /// The cable is pulled.

@@ -146,8 +146,15 @@ impl CameraModel {
         let (start, room) = (within * usize::from(DEPTH_ROOM), usize::from(DEPTH_ROOM));
         let mut packet = image_bytes[start.min(image_bytes.len())..(start + room).min(image_bytes.len())].to_vec();
         if within == IMAGE_PACKETS - 1 {
-            let ticks = (frame * MICROFRAMES / FRAMES) as u32;
-            let words = [0x3a3a_3a3a, 0x5c5c_5c5c, ticks, frame as u32, image as u32, IMAGE_BYTES as u32];
+            let (mut ticks, mut sequence) = ((frame * MICROFRAMES / FRAMES) as u32, frame as u32);
+            for fault in self.faults.iter().filter(|fault| fault.stream == Stream::Depth && fault.frame == frame) {
+                match fault.what {
+                    StreamFault::Ticks(told) => ticks = told,
+                    StreamFault::Sequence(told) => sequence = told,
+                    _ => {}
+                }
+            }
+            let words = [0x3a3a_3a3a, 0x5c5c_5c5c, ticks, sequence, image as u32, IMAGE_BYTES as u32];
             packet.extend(words.iter().flat_map(|word| word.to_le_bytes()));
             packet.extend([0; FOOTER - 24]);
         }

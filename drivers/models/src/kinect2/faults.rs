@@ -41,6 +41,10 @@ pub enum StreamFault {
     BadEnd,
     /// The first bytes are others.
     BadBegin,
+    /// The camera tells this number instead of the frame's (depth only).
+    Sequence(u32),
+    /// The camera tells this time instead of the frame's, ticks (depth only).
+    Ticks(u32),
     /// Nothing comes any more.
     Silent,
     /// The endpoint stalls.
