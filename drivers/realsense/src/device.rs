@@ -189,6 +189,7 @@ impl Realsense {
     /// Time of a picture by the camera's clock, or by the kernel's where there is no metadata at all. `None` where it is
     /// not told: a guess could pair depth with the colour of another moment, so that picture is a lost one.
     fn time(&mut self, stream: usize, shot: &Shot) -> Option<i64> {
+        let other = self.clocks[1 - stream].last;
         let clock = &mut self.clocks[stream];
         self.health.lost_pictures[stream] += clock.lost(shot.buffer.sequence);
         let told = if self.has_device_time { shot.metadata.time_us } else { None };
@@ -199,11 +200,13 @@ impl Realsense {
             if clock.untold >= MOST_WITHOUT_TIME {
                 tracing::warn!("RealSense: the camera tells no time; the kernel's is used");
                 self.has_device_time = false;
+                self.depth.drop_metadata();
+                self.beside.iter_mut().for_each(Stream::drop_metadata);
                 self.rig.sensors.iter_mut().for_each(|s| s.identity.clock = ClockDomain::HostMonotonic);
             }
             return None;
         }
-        Some(clock.time_ns(told, shot.buffer.time_ns))
+        Some(clock.time_ns(told, shot.buffer.time_ns, other))
     }
 
     /// Makes frames of the pairs that are ready.
@@ -322,15 +325,18 @@ fn choose(video: &dyn Video, serial: Option<&str>) -> Result<(Camera, Details), 
 #[derive(Debug, Clone, Copy)]
 struct Clock {
     period: i64,
-    /// The camera's time, the kernel's and ours of the last picture.
-    last: Option<(u32, i64, i64)>,
+    last: Option<Moment>,
     sequence: Option<u32>,
     /// Pictures in a row whose time was not told.
     untold: u32,
 }
 
-/// Steps of the camera's clock that cannot be, seconds: it began anew, or says nonsense.
-const MOST_STEP: f64 = 60.0;
+/// The camera's time (microseconds), the kernel's and ours (nanoseconds) of a picture.
+type Moment = (u32, i64, i64);
+
+/// A step of the camera's clock that is so much longer than the kernel's cannot be, nanoseconds: it began anew, or says
+/// nonsense.
+const SLACK: i64 = 1_000_000_000;
 
 impl Clock {
     fn new(period: i64) -> Self {
@@ -348,18 +354,19 @@ impl Clock {
         u64::from(lost)
     }
 
-    fn time_ns(&mut self, told: Option<u32>, kernel_ns: i64) -> i64 {
+    /// Time of a picture; where none was ever told, from the last one of the `other` stream on, that both are of one clock.
+    fn time_ns(&mut self, told: Option<u32>, kernel_ns: i64, other: Option<Moment>) -> i64 {
         let time = match (self.last, told) {
             (None, Some(now)) => i64::from(now) * MICROSECOND,
-            (None, None) => kernel_ns,
+            (None, None) => other.map_or(kernel_ns, |(_, kernel, time)| time + kernel_ns - kernel),
             (Some((last, kernel, time)), now) => {
                 // Where the camera's time is missing or jumps, the kernel's clock tells how long it was.
                 let by_kernel = (kernel_ns - kernel).max(self.period / 2);
                 let step = now.map(|now| i64::from(now.wrapping_sub(last)) * MICROSECOND);
-                time + step.filter(|s| *s > 0 && *s as f64 * 1e-9 < MOST_STEP).unwrap_or(by_kernel)
+                time + step.filter(|s| *s > 0 && *s <= by_kernel + SLACK).unwrap_or(by_kernel)
             }
         };
-        let passed = |(last, _, before): (u32, i64, i64)| last.wrapping_add(((time - before) / MICROSECOND) as u32);
+        let passed = |(last, _, before): Moment| last.wrapping_add(((time - before) / MICROSECOND) as u32);
         let told = told.unwrap_or_else(|| self.last.map_or(0, passed));
         self.last = Some((told, kernel_ns, time));
         time
@@ -373,11 +380,26 @@ mod tests {
     #[test]
     fn the_clock_goes_on_when_it_wraps_and_when_it_is_missing_or_jumps() {
         let mut clock = Clock::new(33_333_333);
-        let first = clock.time_ns(Some(u32::MAX - 999), 0);
-        assert_eq!(clock.time_ns(Some(32_333), 33_000_000) - first, 33_333_000);
-        let before = clock.time_ns(Some(65_666), 66_000_000);
-        assert_eq!(clock.time_ns(None, 100_000_000) - before, 34_000_000);
-        let before = clock.time_ns(Some(132_332), 133_000_000);
-        assert_eq!(clock.time_ns(Some(3_000_000_000), 166_000_000) - before, 33_000_000);
+        let first = clock.time_ns(Some(u32::MAX - 999), 0, None);
+        assert_eq!(clock.time_ns(Some(32_333), 33_000_000, None) - first, 33_333_000);
+        let before = clock.time_ns(Some(65_666), 66_000_000, None);
+        assert_eq!(clock.time_ns(None, 100_000_000, None) - before, 34_000_000);
+        let before = clock.time_ns(Some(132_332), 133_000_000, None);
+        // A jump of five seconds, and back.
+        assert_eq!(clock.time_ns(Some(5_166_000), 166_000_000, None) - before, 33_000_000);
+        assert_eq!(clock.time_ns(Some(199_000), 199_000_000, None) - before, 66_000_000);
+        // A long pause that the kernel saw too, and a kernel much slower than the camera.
+        let before = clock.time_ns(Some(232_332), 232_000_000, None);
+        assert_eq!(clock.time_ns(Some(90_232_332), 90_232_000_000, None) - before, 90_000_000_000);
+        assert_eq!(clock.time_ns(Some(90_265_665), 93_000_000_000, None) - before, 90_033_333_000);
+    }
+
+    #[test]
+    fn a_stream_that_never_told_its_time_starts_from_the_others_clock() {
+        let (mut depth, mut color) = (Clock::new(33_333_333), Clock::new(33_333_333));
+        let time = depth.time_ns(Some(7_000_000), 100_000_000, None);
+        assert_eq!(color.time_ns(None, 110_000_000, depth.last), time + 10_000_000);
+        // Where neither does, the kernel's stands in.
+        assert_eq!(Clock::new(33_333_333).time_ns(None, 110_000_000, None), 110_000_000);
     }
 }

@@ -84,6 +84,13 @@ impl Stream {
         self.metadata.is_some()
     }
 
+    /// Waits for no more metadata.
+    pub fn drop_metadata(&mut self) {
+        self.metadata.iter_mut().for_each(|(node, _)| node.stop());
+        self.metadata = None;
+        self.waiting.clear();
+    }
+
     /// The node of the pictures, which also has the controls.
     pub fn node(&mut self) -> &mut dyn VideoNode {
         &mut *self.pictures

@@ -103,6 +103,25 @@ fn a_time_that_cannot_be_is_replaced_by_the_kernels() {
     }
 }
 
+#[test]
+fn a_jump_of_seconds_is_no_loss() {
+    let jump = StreamFault::Time(20_000_000);
+    let mut camera = faulty(Wire::Isochronous, &[depth_fault(2, 0, jump), color_fault(2, 0, jump)]);
+    let (frames, _) = take(&mut camera, 6);
+    assert!(frames.iter().zip(0..).all(|(f, k)| has_depth_of(f, k) && has_color_of(f, k) && f.lost_before == 0));
+}
+
+/// Depth tells its time and colour never does: both go on by one clock, and pair.
+#[test]
+fn a_stream_that_never_tells_its_time_pairs_with_one_that_did() {
+    let untold: Vec<_> = (0..60).map(|k| color_fault(k, 0, StreamFault::NoTime)).collect();
+    let mut camera = faulty(Wire::Isochronous, &untold);
+    let (frames, error) = take(&mut camera, 20);
+    assert!(error.is_none(), "{error:?}");
+    assert_eq!(frames.iter().map(|f| f.lost_before).sum::<u32>(), 0);
+    assert!(frames.iter().zip(0..).skip(12).all(|(f, k)| has_depth_of(f, k) && has_color_of(f, k)));
+}
+
 /// By bulk the camera runs ahead of the kernel's clock: pictures whose time is guessed would find the wrong partner.
 #[test]
 fn a_picture_whose_time_is_not_told_is_lost_and_counted() {
