@@ -114,8 +114,10 @@ fn a_jump_of_seconds_is_no_loss() {
 /// Depth tells its time and colour never does: both go on by one clock, and pair.
 #[test]
 fn a_stream_that_never_tells_its_time_pairs_with_one_that_did() {
-    let untold: Vec<_> = (0..60).map(|k| color_fault(k, 0, StreamFault::NoTime)).collect();
-    let mut camera = faulty(Wire::Isochronous, &untold);
+    // The camera's clock began seven seconds before the kernel's.
+    let time = |k: u64| StreamFault::Time(7_000_000 + (k * 1_000_000 / 30) as u32);
+    let told = (0..60).flat_map(|k| [depth_fault(k, 0, time(k)), color_fault(k, 0, StreamFault::NoTime)]);
+    let mut camera = faulty(Wire::Isochronous, &told.collect::<Vec<_>>());
     let (frames, error) = take(&mut camera, 20);
     assert!(error.is_none(), "{error:?}");
     assert_eq!(frames.iter().map(|f| f.lost_before).sum::<u32>(), 0);
