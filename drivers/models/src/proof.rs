@@ -22,8 +22,8 @@ const FIRST_LIMIT: Duration = Duration::from_secs(1);
 const FIRST_TRIES: u32 = 5;
 /// Frames of a cycle before the unplugging.
 const CYCLE_FRAMES: u32 = 2;
-/// One frame in so many may lack its depth or its colour once half of the take is over: while streams start, a slow
-/// machine loses pictures of one of them.
+/// So many-th part of a take's frames may lack depth or colour in its second half; its first half is not judged: while
+/// streams start, a slow machine loses pictures of one of them.
 const UNPAIRED: u64 = 10;
 
 /// The model's number of what a frame shows, `None` where it has nothing to tell it by; or how it differs from that.
@@ -73,7 +73,7 @@ pub fn same<T: PartialEq + Debug>(what: &str, seen: &[T], sent: &[T]) -> Result<
 /// the model's numbers.
 ///
 /// # Errors
-/// What differs; where more than a tenth of the frames lack depth or colour after the first half.
+/// What differs; where more frames than a tenth of all lack depth or colour in the second half.
 pub fn take(file: &Path, count: u64, shown: impl FnMut(&Frame) -> Shown) -> Result<String, String> {
     let replay = Replay::open(file).map_err(|error| error.to_string())?;
     let frames = (0..replay.len().min(count)).map(|index| replay.frame(index).map_err(|error| error.to_string()));
