@@ -63,13 +63,11 @@ impl Pile {
         let (mut fresh, mut dirty) = (true, vec![true; self.surfaces.len()]);
         for round in 0..settings.rounds {
             let found = self.found(&mut contacts, &patience, fresh, settings);
-            if found.is_empty() && fresh {
-                // Believed only after the layers were untangled and everything was looked at afresh.
-                if !self.untangle(&mut dirty) {
+            if found.is_empty() {
+                // Believed only after everything was looked at afresh and the layers were untangled.
+                if fresh && !self.untangle(&mut dirty) {
                     return round + 1;
                 }
-            }
-            if found.is_empty() {
                 (contacts, fresh) = (Contacts::new(&self.surfaces), true);
                 continue;
             }
