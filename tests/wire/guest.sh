@@ -81,17 +81,6 @@ cycles=$(value wire_cycles)
 slow_ms=1500
 echo "== a loop of $(loop_ms) ms"
 
-# Decoding its packets is most of all the work here, on an emulated processor: it goes on beside the others, after them.
-if wanted kinect2; then
-    (
-        serve 02c4 0 "$bin/examples/wire_kinect2" serve "$rig/kinect2-images"
-        renice -n 10 $BASHPID
-        RAYON_NUM_THREADS=1 record kinect2 kinect2 "$(seconds_of "$(value wire_kinect2)" 5)"
-        gone 02c4
-    ) &
-    kinect2=$!
-fi
-
 if wanted kinect1; then
     serve 02ae 0 "$bin/examples/wire_kinect1" serve
     "$bin/toile" devices
@@ -118,8 +107,12 @@ if wanted stereo; then
     gone 9750
 fi
 
+# Last and alone: its packets cost an emulated processor more than all else here, and pictures of cameras that wait for
+# nobody would be lost beside it.
 if wanted kinect2; then
-    wait $kinect2
+    serve 02c4 0 "$bin/examples/wire_kinect2" serve "$rig/kinect2-images"
+    record kinect2 kinect2 "$(seconds_of "$(value wire_kinect2)" 5)"
+    gone 02c4
     tell "kinect2 unplug" "$bin/examples/wire_kinect2" cycles "$rig/kinect2-images" "$(value wire_kinect2_cycles)"
 fi
 

@@ -22,9 +22,10 @@ const FIRST_LIMIT: Duration = Duration::from_secs(1);
 const FIRST_TRIES: u32 = 5;
 /// Frames of a cycle before the unplugging.
 const CYCLE_FRAMES: u32 = 2;
-/// So many-th part of a take's frames may lack depth or colour in its second half; its first half is not judged: while
-/// streams start, a slow machine loses pictures of one of them.
-const UNPAIRED: u64 = 10;
+/// In a take's second half at least one in so many frames has both depth and colour. A frame that lacks one is no fault
+/// of the driver's: the machine was too slow for that picture, and had the driver only failed to pair it, the model's
+/// number of the frame would come twice. But both streams must run.
+const PAIRED: u64 = 2;
 
 /// The model's number of what a frame shows, `None` where it has nothing to tell it by; or how it differs from that.
 pub type Shown = Result<Option<u64>, String>;
@@ -73,7 +74,7 @@ pub fn same<T: PartialEq + Debug>(what: &str, seen: &[T], sent: &[T]) -> Result<
 /// the model's numbers.
 ///
 /// # Errors
-/// What differs; where more frames than a tenth of all lack depth or colour in the second half.
+/// What differs; where most frames of the second half lack depth or colour.
 pub fn take(file: &Path, count: u64, shown: impl FnMut(&Frame) -> Shown) -> Result<String, String> {
     let replay = Replay::open(file).map_err(|error| error.to_string())?;
     let frames = (0..replay.len().min(count)).map(|index| replay.frame(index).map_err(|error| error.to_string()));
@@ -112,7 +113,7 @@ fn compare(
     match wrong.first() {
         Some(first) => Err(format!("{said}: {first}; {} such in all", wrong.len())),
         None if seen < count => Err(format!("{said}: the take has only {seen} frames")),
-        None if late * UNPAIRED > count => Err(format!("{said}: too many frames lack depth or colour")),
+        None if late * PAIRED > count / 2 => Err(format!("{said}: most frames lack depth or colour")),
         None => Ok(said),
     }
 }
@@ -241,9 +242,14 @@ mod tests {
     }
 
     #[test]
-    fn a_tenth_may_lack_depth_after_the_start() {
+    fn what_came_of_one_time_must_be_paired() {
+        assert!(compared(&[(7, 0), (8, 0), (8, 0), (9, 0)], 1..2).unwrap_err().contains("is the model's 8"));
+    }
+
+    #[test]
+    fn both_streams_must_run_after_the_start() {
         let numbers: Vec<(u64, u32)> = (0..20).map(|k| (k, 0)).collect();
-        assert_eq!(compared(&numbers, 0..12).unwrap(), "20/20 (lost 0, unpaired 12)");
-        assert!(compared(&numbers, 17..20).unwrap_err().contains("too many frames lack"));
+        assert_eq!(compared(&numbers, 0..15).unwrap(), "20/20 (lost 0, unpaired 15)");
+        assert!(compared(&numbers, 14..20).unwrap_err().contains("most frames lack"));
     }
 }
