@@ -82,15 +82,14 @@ impl Arm {
         let body = level.body;
         let (own, others): (Vec<usize>, Vec<usize>) = (0..body.len()).partition(|&v| self.holds(body.main_joint(v)));
         let left = left_over(level.reverse, &body.pose(state), &others)?;
-        let here = cost(level, &left, &body.pose_of(state, &own));
-        let mut best: Option<(f32, State)> = None;
+        let here = cost(level, &left, &body.pose_of(state, &own), f32::INFINITY)?;
+        let (mut least, mut best) = (BETTER * here, None);
         for candidate in self.candidates(body, state) {
-            let there = cost(level, &left, &body.pose_of(&candidate, &own));
-            if best.as_ref().is_none_or(|b| there < b.0) {
-                best = Some((there, candidate));
+            if let Some(there) = cost(level, &left, &body.pose_of(&candidate, &own), least) {
+                (least, best) = (there, Some(candidate));
             }
         }
-        best.filter(|b| b.0 < BETTER * here).map(|b| b.1)
+        best
     }
 
     fn holds(&self, joint: Joint) -> bool {
@@ -130,17 +129,25 @@ impl Arm {
     }
 }
 
-/// Robust disagreement of the arm with the scan plus that of what is left over with the arm, square metres.
-fn cost(level: &Level, left: &Samples, arm: &[(Point3<f32>, Vector3<f32>, f32)]) -> f32 {
+/// Robust disagreement of the arm with the scan plus that of what is left over with the arm, square metres; `None` where
+/// it is not below `least`.
+fn cost(level: &Level, left: &Samples, arm: &[(Point3<f32>, Vector3<f32>, f32)], least: f32) -> Option<f32> {
     let robust = |squared: f32| squared / (squared + KERNEL * KERNEL);
-    let forward = arm.iter().map(|(p, n, area)| {
+    let mut sum = 0.0;
+    for (p, n, area) in arm {
         let hit = level.scan.nearest(p, n, 2.0 * KERNEL, 0.2);
-        area * hit.map_or(1.0, |q| robust((p - level.scan.samples.points[q as usize]).norm_squared()))
-    });
-    let stride = left.points.len().div_ceil(MOST);
-    let backward = left.points.iter().zip(&left.weights).step_by(stride.max(1)).map(|(q, w)| {
-        let nearest = arm.iter().map(|(p, ..)| (p - q).norm_squared()).fold(f32::INFINITY, f32::min);
-        w * robust(nearest.min(1.0))
-    });
-    forward.sum::<f32>() + stride as f32 * backward.sum::<f32>()
+        sum += area * hit.map_or(1.0, |q| robust((p - level.scan.samples.points[q as usize]).norm_squared()));
+        if sum >= least {
+            return None;
+        }
+    }
+    let stride = left.points.len().div_ceil(MOST).max(1);
+    for (q, w) in left.points.iter().zip(&left.weights).step_by(stride) {
+        let nearest = arm.iter().map(|(p, ..)| (p - q).norm_squared()).fold(1.0, f32::min);
+        sum += stride as f32 * w * robust(nearest);
+        if sum >= least {
+            return None;
+        }
+    }
+    Some(sum)
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use toile_character::{BodyModel, JointRegressor, Pose, Skeleton, SkinnedMesh, skinning};
-use toile_geometry::Mesh;
+use toile_geometry::{Mesh, bvh::Bvh};
 
 use crate::{
     FitSettings, FittingError, Mend, ScanLandmark, Verdict,
@@ -93,8 +93,9 @@ pub fn fit_body(
     progress(0.7);
     let by_hand = mended(model, &settings.landmarks, &mend)?;
     let posed = model.posed(&fine.state.beta, &fine.state.pose);
-    let landmarks = landmarks(model, &posed, &scan, &trust, &by_hand);
-    let conformed = conform(model, &fine.state, &scan, &trust, settings, &landmarks)?;
+    let bvh = Bvh::new(&scan.positions, &scan.triangles);
+    let landmarks = landmarks(model, &posed, &scan, &bvh, &trust, &by_hand);
+    let conformed = conform(model, &fine.state, &scan, &bvh, &trust, settings, &landmarks)?;
     progress(0.95);
     let context = Context { prepared, mend, coarse_iterations, landmarks, dressed: settings.dressed };
     let fit = assemble(model, &scan, fine, conformed, context);

@@ -1,13 +1,11 @@
-//! An oriented point cloud with a k-d tree: what closest points are looked up in.
-
-use std::num::NonZero;
+//! Point clouds that closest points are looked up in: oriented samples of a surface, and mere points.
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 use toile_geometry::Mesh;
 
-/// How many neighbours are tried for one with a compatible normal.
-const CANDIDATES: NonZero<usize> = NonZero::new(12).expect("twelve is not zero");
+use crate::point_tree::PointTree;
 
 /// Oriented samples of a surface.
 #[derive(Debug, Clone, Default)]
@@ -26,7 +24,7 @@ pub(crate) struct Samples {
 /// Samples with a k-d tree over them.
 pub(crate) struct Cloud {
     pub samples: Samples,
-    tree: ImmutableKdTree<f32, 3>,
+    tree: PointTree,
 }
 
 impl Samples {
@@ -38,7 +36,7 @@ impl Samples {
             .filter(|&v| areas[v] > 0.0 && normals[v] != Vector3::zeros())
             .map(|v| (key(&mesh.positions[v], &normals[v], cell), v as u32))
             .collect();
-        keyed.sort_unstable();
+        keyed.par_sort_unstable();
         let mut out = Self::default();
         for group in keyed.chunk_by(|a, b| a.0 == b.0) {
             out.push_mean(mesh, normals, &areas, trust, group);
@@ -80,33 +78,33 @@ impl Samples {
 impl Cloud {
     /// Builds the tree; `None` where there is no sample.
     pub fn new(samples: Samples) -> Option<Self> {
-        let entries: Vec<[f32; 3]> = samples.points.iter().map(|p| [p.x, p.y, p.z]).collect();
-        if entries.is_empty() {
+        if samples.points.is_empty() {
             return None;
         }
-        let tree = ImmutableKdTree::new_from_slice(&entries).ok()?;
+        let tree = PointTree::new(&samples.points);
         Some(Self { samples, tree })
     }
 
     /// The nearest sample within `max_distance` whose normal makes a cosine of at least `min_cos` with `normal`.
     pub fn nearest(&self, p: &Point3<f32>, normal: &Vector3<f32>, max_distance: f32, min_cos: f32) -> Option<u32> {
-        let limit = max_distance * max_distance;
         let fits = |item: u32| self.samples.normals[item as usize].dot(normal) >= min_cos;
-        let query = [p.x, p.y, p.z];
-        let first = self.tree.query(&query).nearest_one::<SquaredEuclidean<f32>>().execute();
-        if first.distance > limit {
-            return None;
-        }
-        if fits(first.item) {
-            return Some(first.item);
-        }
-        let near = self.tree.query(&query).nearest_n::<SquaredEuclidean<f32>>(CANDIDATES).execute();
-        near.iter().filter(|n| n.distance <= limit).map(|n| n.item).find(|&i| fits(i))
+        self.tree.nearest(p, max_distance, fits).map(|n| n.0)
+    }
+}
+
+/// Points of which only the distance is asked.
+pub(crate) struct Nearby(ImmutableKdTree<f32, 3>);
+
+impl Nearby {
+    /// Builds the tree; `None` where there is no point.
+    pub fn new(points: impl Iterator<Item = Point3<f32>>) -> Option<Self> {
+        let entries: Vec<[f32; 3]> = points.map(|p| [p.x, p.y, p.z]).collect();
+        if entries.is_empty() { None } else { ImmutableKdTree::new_from_slice(&entries).ok().map(Self) }
     }
 
-    /// Distance to the nearest sample, metres.
+    /// Distance to the nearest point, metres.
     pub fn distance(&self, p: &Point3<f32>) -> f32 {
-        self.tree.query(&[p.x, p.y, p.z]).nearest_one::<SquaredEuclidean<f32>>().execute().distance.sqrt()
+        self.0.query(&[p.x, p.y, p.z]).nearest_one::<SquaredEuclidean<f32>>().execute().distance.sqrt()
     }
 }
 

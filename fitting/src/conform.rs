@@ -49,6 +49,7 @@ pub(crate) fn conform(
     model: &BodyModel,
     state: &State,
     scan: &Mesh,
+    bvh: &Bvh,
     trust: &[f32],
     settings: &FitSettings,
     landmarks: &[ScanLandmark],
@@ -59,8 +60,7 @@ pub(crate) fn conform(
     }
     let start = mapped(model, &model.shape(&state.beta), &posed, landmarks);
     let anchors = anchors(model, landmarks);
-    let surface =
-        Surface { scan, trust, bvh: Bvh::new(&scan.positions, &scan.triangles), settings: &settings.conformation };
+    let surface = Surface { scan, trust, bvh, settings: &settings.conformation };
     let elastic = Elastic::new(model, &start, &settings.conformation)?;
     let mut freedom = freedom(model);
     let mut points = start.clone();
@@ -108,7 +108,7 @@ fn min_cos(region: Region, settings: &ConformSettings) -> f32 {
 struct Surface<'a> {
     scan: &'a Mesh,
     trust: &'a [f32],
-    bvh: Bvh,
+    bvh: &'a Bvh,
     settings: &'a ConformSettings,
 }
 
@@ -150,8 +150,8 @@ impl Surface<'_> {
 /// The bending energy of the template in the scan's pose.
 struct Elastic {
     areas: Vec<f64>,
-    /// Upper triangle of the bending matrix, column-major; every diagonal entry is there.
-    entries: Vec<Triplet<usize, usize, f64>>,
+    /// Upper triangle of bending and membrane; every diagonal entry is there, the last of its column.
+    matrix: SparseColMat<usize, f64>,
     symbolic: SymbolicLlt<usize>,
 }
 
@@ -166,16 +166,16 @@ impl Elastic {
         let n = points.len();
         let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).map_err(|_| singular())?;
         let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Upper).map_err(|_| singular())?;
-        Ok(Self { areas, entries, symbolic })
+        Ok(Self { areas, matrix, symbolic })
     }
 
     fn solve(&self, start: &[Point3<f32>], pulls: &[Pull]) -> Result<Vec<Point3<f32>>, FittingError> {
         let n = start.len();
-        let mut entries = self.entries.clone();
+        let mut matrix = self.matrix.clone();
         for (v, pull) in pulls.iter().enumerate() {
-            entries.push(Triplet::new(v, v, self.areas[v] * (pull.weight + TIE)));
+            let diagonal = self.matrix.col_ptr()[v + 1] - 1;
+            matrix.val_mut()[diagonal] += self.areas[v] * (pull.weight + TIE);
         }
-        let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).map_err(|_| singular())?;
         let factor =
             Llt::try_new_with_symbolic(self.symbolic.clone(), matrix.as_ref(), Side::Upper).map_err(|_| singular())?;
         let rhs =

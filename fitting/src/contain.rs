@@ -10,11 +10,7 @@ use rayon::prelude::*;
 use toile_character::{BodyModel, Region};
 use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals, topology::VertexNeighbors};
 
-use crate::{
-    cloud::{Cloud, Samples},
-    conform::unfolded,
-    uncross::uncrossed,
-};
+use crate::{cloud::Nearby, conform::unfolded, uncross::uncrossed};
 
 /// Scan farther than this says nothing of a vertex, metres: cloth, or another finger.
 const REACH: f32 = 0.008;
@@ -99,8 +95,7 @@ impl Margins {
 /// How far each vertex may move: not through a thin part, lips and lids and their pockets not at all.
 fn farthest(model: &BodyModel, points: &[Point3<f32>], normals: &[Vector3<f32>]) -> Vec<f32> {
     let bvh = Bvh::new(points, &model.triangles);
-    let pockets = points.iter().zip(&model.inner).filter(|(_, inner)| **inner).map(|(p, _)| *p).collect();
-    let pockets = Cloud::new(Samples { points: pockets, ..Samples::default() });
+    let pockets = Nearby::new(points.iter().zip(&model.inner).filter(|(_, inner)| **inner).map(|(p, _)| *p));
     let most = |v: usize| {
         let from = points[v] - normals[v] * 1e-4;
         let thickness = bvh.ray(&from, &-normals[v], FARTHEST / OF_THICKNESS).map_or(f32::INFINITY, |h| h.t);
@@ -154,8 +149,8 @@ fn soften(depth: &mut Vec<f32>, neighbors: &VertexNeighbors) {
 
 /// Moves the walls of mouth and eye pockets away from their hollow.
 fn draw_pockets_back(model: &BodyModel, points: &mut [Point3<f32>]) {
-    let skin = (0..points.len()).filter(|&v| !model.inner[v]).map(|v| points[v]).collect();
-    let Some(skin) = Cloud::new(Samples { points: skin, ..Samples::default() }) else { return };
+    let skin = (0..points.len()).filter(|&v| !model.inner[v]).map(|v| points[v]);
+    let Some(skin) = Nearby::new(skin) else { return };
     let normals = vertex_normals(points, &model.triangles);
     for v in (0..points.len()).filter(|&v| model.inner[v]) {
         let flesh = skin.distance(&points[v]);

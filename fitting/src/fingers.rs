@@ -1,12 +1,13 @@
 //! Hands, once the body stands: wrists and fingers, or wrists and arms in a later take; a few hundred vertices.
 
+use nalgebra::Point3;
 use toile_character::{BodyModel, Joint, Pose, Region, SkinnedMesh, joint::JOINTS};
 use toile_geometry::{Mesh, mesh::vertex_normals};
 
 use crate::{
     FitSettings, FittingError,
     articulated::{Articulated, Columns, State},
-    cloud::{Cloud, Samples},
+    cloud::{Cloud, Nearby, Samples},
     correspond::{Gate, matches},
     level::Level,
     prior::JointPrior,
@@ -61,9 +62,9 @@ pub(crate) fn fit_hands_again(
 ) -> Result<Pose, FittingError> {
     let mut joints = WRISTS.to_vec();
     joints.extend(hidden_arms(model, body, scan, trust, pose));
+    let prior = JointPrior::around(pose.clone(), AGAIN_SIGMA, &body.skeleton);
     let body = Articulated::of_skinned(body, &hands(model, &body.mesh));
     let state = State { pose: pose.clone(), beta: Vec::new() };
-    let prior = JointPrior::around(pose.clone(), AGAIN_SIGMA);
     // fingers stay: how they moved since is finer than a scan in which they often melt together
     let turn = Turn { joints, noise: 0.004, shape_sigma: 1.0 };
     Ok(turned(&body, scan, trust, &prior, turn, state)?.pose)
@@ -109,7 +110,8 @@ fn turned(
 ) -> Result<State, FittingError> {
     let posed = body.pose(&state);
     let Some((cloud, reverse)) = around(&posed.points, scan, trust) else { return Ok(state) };
-    let near = |p: &nalgebra::Point3<f32>| cloud.distance(p) < 0.5 * NEAR;
+    let Some(samples) = Nearby::new(reverse.points.iter().copied()) else { return Ok(state) };
+    let near = |p: &Point3<f32>| samples.distance(p) < 0.5 * NEAR;
     let seen: f32 = posed.points.iter().zip(&body.areas).filter(|(p, _)| near(p)).map(|(_, a)| a).sum();
     if seen < LEAST_SEEN * body.areas.iter().sum::<f32>() {
         return Ok(state);
@@ -131,10 +133,10 @@ fn turned(
 }
 
 /// Scan samples near the hands, as the cloud and as what is looked up in the other direction.
-fn around(hands: &[nalgebra::Point3<f32>], scan: &Mesh, trust: &[f32]) -> Option<(Cloud, Samples)> {
-    let tree = Cloud::new(Samples { points: hands.to_vec(), ..Samples::default() })?;
+fn around(hands: &[Point3<f32>], scan: &Mesh, trust: &[f32]) -> Option<(Cloud, Samples)> {
+    let tree = Nearby::new(hands.iter().copied())?;
     let (lo, hi) = hands.iter().fold((hands[0], hands[0]), |(lo, hi), p| (lo.inf(p), hi.sup(p)));
-    let inside = |p: &nalgebra::Point3<f32>| (0..3).all(|k| p[k] > lo[k] - NEAR && p[k] < hi[k] + NEAR);
+    let inside = |p: &Point3<f32>| (0..3).all(|k| p[k] > lo[k] - NEAR && p[k] < hi[k] + NEAR);
     let is_near: Vec<bool> = scan.positions.iter().map(|p| inside(p) && tree.distance(p) < NEAR).collect();
     let (part, old) = scan.filter_triangles(|t| scan.triangles[t].iter().any(|&v| is_near[v as usize]));
     let trust: Vec<f32> = old.iter().map(|&v| trust[v as usize]).collect();

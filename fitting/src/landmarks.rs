@@ -46,10 +46,11 @@ pub(crate) fn landmarks(
     model: &BodyModel,
     posed: &[Point3<f32>],
     scan: &Mesh,
+    bvh: &Bvh,
     trust: &[f32],
     by_hand: &HandLandmarks,
 ) -> Vec<ScanLandmark> {
-    let surface = Surface { scan, trust, bvh: Bvh::new(&scan.positions, &scan.triangles) };
+    let surface = Surface { scan, trust, bvh };
     let normals = vertex_normals(posed, &model.triangles);
     let one = |(name, vertex): &(String, u32)| {
         let from = posed[*vertex as usize];
@@ -111,7 +112,7 @@ fn main(weights: &SkinWeights, v: usize) -> u8 {
 struct Surface<'a> {
     scan: &'a Mesh,
     trust: &'a [f32],
-    bvh: Bvh,
+    bvh: &'a Bvh,
 }
 
 /// A patch point, its nearest scan point with normal, and how far that is trusted.

@@ -22,6 +22,7 @@ mod landmarks;
 mod level;
 mod mapping;
 pub mod measure;
+mod point_tree;
 mod prepare;
 mod prior;
 mod rig;

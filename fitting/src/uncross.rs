@@ -1,37 +1,39 @@
 //! A deformed surface taken back where it crosses itself and did not before.
 
 use nalgebra::Point3;
-use toile_geometry::{Mesh, bvh::Bvh, intersection::self_crossings};
+use toile_geometry::{
+    Mesh,
+    bvh::Bvh,
+    intersection::{pair_crosses, self_crossings, self_crossings_among},
+};
 
 /// Most rounds; each halves the way that is left, so that the last is within a few micrometres of the start.
 const ROUNDS: usize = 12;
 
 /// Where triangles of `points` cross that did not cross in `start`, the vertices around go back towards `start`, half
 /// of the way in each round, until no crossing is added.
-pub(crate) fn uncrossed(
-    triangles: &[[u32; 3]],
-    start: &[Point3<f32>],
-    mut points: Vec<Point3<f32>>,
-) -> Vec<Point3<f32>> {
-    let before = crossings(triangles, start);
+pub(crate) fn uncrossed(triangles: &[[u32; 3]], start: &[Point3<f32>], points: Vec<Point3<f32>>) -> Vec<Point3<f32>> {
+    let before = Mesh::new(start.to_vec(), triangles.to_vec());
+    let mut mesh = Mesh::new(points, triangles.to_vec());
+    let mut pairs = self_crossings(&mesh, &Bvh::new(&mesh.positions, triangles));
     for _ in 0..ROUNDS {
-        let mut back = vec![false; points.len()];
+        let mut back = vec![false; start.len()];
         let mut mark = |t: u32| triangles[t as usize].iter().for_each(|&v| back[v as usize] = true);
-        let added = crossings(triangles, &points).into_iter().filter(|pair| before.binary_search(pair).is_err());
+        let added = pairs.into_iter().filter(|pair| !pair_crosses(&before, pair[0], pair[1]));
         added.flatten().for_each(&mut mark);
         if !back.contains(&true) {
             break;
         }
-        for (v, _) in around(triangles, &back).iter().enumerate().filter(|b| *b.1) {
-            points[v] = nalgebra::center(&points[v], &start[v]);
+        let back = around(triangles, &back);
+        for (v, _) in back.iter().enumerate().filter(|b| *b.1) {
+            mesh.positions[v] = nalgebra::center(&mesh.positions[v], &start[v]);
         }
+        let has_moved = |t: &u32| triangles[*t as usize].iter().any(|&v| back[v as usize]);
+        let moved: Vec<u32> = (0..triangles.len() as u32).filter(has_moved).collect();
+        // every triangle that crossed has moved, so that new crossings and those that are left have one of these
+        pairs = self_crossings_among(&mesh, &moved, &Bvh::new(&mesh.positions, triangles));
     }
-    points
-}
-
-fn crossings(triangles: &[[u32; 3]], points: &[Point3<f32>]) -> Vec<[u32; 2]> {
-    let mesh = Mesh::new(points.to_vec(), triangles.to_vec());
-    self_crossings(&mesh, &Bvh::new(points, triangles))
+    mesh.positions
 }
 
 /// The marked vertices and their neighbours.
@@ -46,6 +48,11 @@ fn around(triangles: &[[u32; 3]], marked: &[bool]) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn crossings(triangles: &[[u32; 3]], points: &[Point3<f32>]) -> Vec<[u32; 2]> {
+        let mesh = Mesh::new(points.to_vec(), triangles.to_vec());
+        self_crossings(&mesh, &Bvh::new(points, triangles))
+    }
 
     #[test]
     fn a_spike_through_a_sheet_goes_back_and_nothing_else_moves() {

@@ -9,6 +9,8 @@ use crate::triangle;
 
 /// Triangles in a leaf.
 const LEAF: usize = 4;
+/// More triangles than this are built by two threads.
+const PARALLEL: usize = 4096;
 
 /// The closest point of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,6 +52,18 @@ struct Node {
     radius: f32,
 }
 
+impl Node {
+    const EMPTY: Self = Self {
+        lo: Point3::new(0.0, 0.0, 0.0),
+        hi: Point3::new(0.0, 0.0, 0.0),
+        start: 0,
+        count: 0,
+        dipole: Vector3::new(0.0, 0.0, 0.0),
+        center: Point3::new(0.0, 0.0, 0.0),
+        radius: 0.0,
+    };
+}
+
 /// A bounding-volume hierarchy that owns copies of its triangles' corners.
 #[derive(Debug, Clone)]
 pub struct Bvh {
@@ -65,9 +79,10 @@ impl Bvh {
         let mut order: Vec<u32> = (0..all.len() as u32).collect();
         let centroids: Vec<Point3<f32>> =
             all.iter().map(|[a, b, c]| Point3::from((a.coords + b.coords + c.coords) / 3.0)).collect();
-        let mut nodes = Vec::with_capacity(all.len());
+        let mut nodes = Vec::new();
         if !all.is_empty() {
-            build(&mut nodes, &mut order, 0, &all, &centroids);
+            nodes.resize(node_counts(all.len()).0, Node::EMPTY);
+            build(&mut nodes, &mut order, (0, 0), &all, &centroids);
         }
         let corners = order.iter().map(|&t| all[t as usize]).collect();
         Self { nodes, order, corners }
@@ -230,38 +245,54 @@ impl Stack {
     }
 }
 
-fn build(nodes: &mut Vec<Node>, order: &mut [u32], first: usize, all: &[[Point3<f32>; 3]], centroids: &[Point3<f32>]) {
-    let index = nodes.len();
-    let mut node = summary(order, all);
-    node.start = first as u32;
-    node.count = order.len() as u32;
-    nodes.push(node);
-    if order.len() <= LEAF {
+/// Number of nodes over `count` and over `count + 1` triangles.
+fn node_counts(count: usize) -> (usize, usize) {
+    if count < LEAF {
+        return (1, 1);
+    }
+    let (half, more) = node_counts(count / 2);
+    let (here, next) = if count.is_multiple_of(2) { (2 * half, half + more) } else { (half + more, 2 * more) };
+    (if count == LEAF { 1 } else { 1 + here }, 1 + next)
+}
+
+/// Fills `nodes` (all those over `order`); `at` is the index of the first node and of the first entry of the order.
+fn build(
+    nodes: &mut [Node],
+    order: &mut [u32],
+    at: (usize, usize),
+    all: &[[Point3<f32>; 3]],
+    centroids: &[Point3<f32>],
+) {
+    let count = order.len();
+    let (node, below) = nodes.split_at_mut(1);
+    node[0] = summary(order, all);
+    if count <= LEAF {
+        (node[0].start, node[0].count) = (at.1 as u32, count as u32);
         return;
     }
     let c = |t: u32| centroids[t as usize];
     let lo = order.iter().fold(c(order[0]), |m, &t| m.inf(&c(t)));
     let hi = order.iter().fold(c(order[0]), |m, &t| m.sup(&c(t)));
     let axis = (hi - lo).imax();
-    let middle = order.len() / 2;
+    let middle = count / 2;
     order.select_nth_unstable_by(middle, |&a, &b| c(a)[axis].total_cmp(&c(b)[axis]).then(a.cmp(&b)));
     let (left, right) = order.split_at_mut(middle);
-    build(nodes, left, first, all, centroids);
-    nodes[index].start = nodes.len() as u32;
-    nodes[index].count = 0;
-    build(nodes, right, first + middle, all, centroids);
+    let (left_nodes, right_nodes) = below.split_at_mut(node_counts(middle).0);
+    let right_at = (at.0 + 1 + left_nodes.len(), at.1 + middle);
+    node[0].start = right_at.0 as u32;
+    let mut low = || build(left_nodes, left, (at.0 + 1, at.1), all, centroids);
+    let mut high = || build(right_nodes, right, right_at, all, centroids);
+    if count > PARALLEL {
+        rayon::join(low, high);
+    } else {
+        low();
+        high();
+    }
 }
 
 fn summary(order: &[u32], all: &[[Point3<f32>; 3]]) -> Node {
-    let mut node = Node {
-        lo: all[order[0] as usize][0],
-        hi: all[order[0] as usize][0],
-        start: 0,
-        count: 0,
-        dipole: Vector3::zeros(),
-        center: Point3::origin(),
-        radius: 0.0,
-    };
+    let first = all[order[0] as usize][0];
+    let mut node = Node { lo: first, hi: first, ..Node::EMPTY };
     let (mut dipole, mut center, mut area) = (Vector3::<f64>::zeros(), Vector3::<f64>::zeros(), 0.0);
     for &t in order {
         let corners = &all[t as usize];

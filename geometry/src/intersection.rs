@@ -48,7 +48,7 @@ pub fn self_crossings(mesh: &Mesh, bvh: &Bvh) -> Vec<[u32; 2]> {
     collect(&all, |t, found| {
         let x = mesh.corners(t as usize);
         visit_sorted(bvh, &x, |u| {
-            if u > t && neighbours_cross(mesh, t, u) {
+            if u > t && pair_crosses(mesh, t, u) {
                 found.push([t, u]);
             }
         });
@@ -60,7 +60,7 @@ pub fn self_crossings_among(mesh: &Mesh, some: &[u32], bvh: &Bvh) -> Vec<[u32; 2
     let mut pairs = collect(some, |t, found| {
         let x = mesh.corners(t as usize);
         visit_sorted(bvh, &x, |u| {
-            if u != t && neighbours_cross(mesh, t, u) {
+            if u != t && pair_crosses(mesh, t, u) {
                 found.push([t.min(u), t.max(u)]);
             }
         });
@@ -70,7 +70,8 @@ pub fn self_crossings_among(mesh: &Mesh, some: &[u32], bvh: &Bvh) -> Vec<[u32; 2
     pairs
 }
 
-fn neighbours_cross(mesh: &Mesh, t: u32, u: u32) -> bool {
+/// True where two triangles of one mesh cross, as [`self_crossings`] judges a pair.
+pub fn pair_crosses(mesh: &Mesh, t: u32, u: u32) -> bool {
     let (ti, ui) = (mesh.triangles[t as usize], mesh.triangles[u as usize]);
     let (x, y) = (mesh.corners(t as usize), mesh.corners(u as usize));
     let shared: Vec<(usize, usize)> =
