@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use serde_json::{Map, Value, json};
-use toile_character::{JOINT_COUNT, Joint, Pose, Skeleton, joint::JOINTS};
+use toile_character::{JOINT_COUNT, Joint, JointLimit, Pose, Skeleton, joint::JOINTS, joint_limits};
 
 use crate::buffer::{Buffer, Shape, Target};
 
@@ -10,18 +10,21 @@ use crate::buffer::{Buffer, Shape, Target};
 pub(crate) struct Rig {
     /// `scene_from_joint`, by [`Joint::index`].
     frames: Vec<Isometry3<f64>>,
+    /// How far the nodes' rotations go.
+    limits: Vec<JointLimit>,
 }
 
 impl Rig {
     /// Joints as they stand and are turned in `pose`.
     pub fn posed(skeleton: &Skeleton, pose: &Pose) -> Self {
-        Self { frames: pose.joint_frames(skeleton) }
+        Self { frames: pose.joint_frames(skeleton), limits: joint_limits(skeleton) }
     }
 
     /// Joints where `pose` puts them, all axes along the scene's, as VRM likes its rest.
     pub fn unturned(skeleton: &Skeleton, pose: &Pose) -> Self {
         let place = |p: &Point3<f64>| Isometry3::from(Translation3::from(p.coords));
-        Self { frames: pose.joint_positions(skeleton).iter().map(place).collect() }
+        let limits = joint_limits(skeleton).iter().map(|l| l.from_rest(pose)).collect();
+        Self { frames: pose.joint_positions(skeleton).iter().map(place).collect(), limits }
     }
 
     /// `parent_from_joint` of `joint`.
@@ -49,6 +52,10 @@ impl Rig {
         if !children.is_empty() {
             node.insert("children".into(), json!(children));
         }
+        let limits: Vec<Value> = self.limits.iter().filter(|l| l.joint == joint).map(limit).collect();
+        if !limits.is_empty() {
+            node.insert("extras".into(), json!({ "limits": limits }));
+        }
         Value::Object(node)
     }
 
@@ -65,4 +72,15 @@ impl Rig {
             "inverseBindMatrices": buffer.add(&matrices, Shape::Mat4, Target::Data),
         })
     }
+}
+
+/// Bounds of the component about `axis` (in the parent node's frame) of the rotation vector of a node's `rotation`; glTF and VRM 1.0
+/// have no field of their own for it.
+fn limit(limit: &JointLimit) -> Value {
+    let rounded = |x: f64| (x * 1e6).round() / 1e6;
+    json!({
+        "axis": limit.axis.map(rounded).as_slice(),
+        "low_rad": rounded(limit.low),
+        "high_rad": rounded(limit.high),
+    })
 }

@@ -57,6 +57,17 @@ fn bones_are_all_there_once_and_hang_together() {
 }
 
 #[test]
+fn elbows_say_that_they_bend_forward_only() {
+    let file = json(&written());
+    let node = file["nodes"].as_array().unwrap().iter().find(|n| n["name"] == "leftLowerArm").unwrap();
+    let limit = &node["extras"]["limits"][0];
+    let axis: Vec<f64> = limit["axis"].as_array().unwrap().iter().map(|a| a.as_f64().unwrap()).collect();
+    assert!(axis[1] < -0.9, "the forearm of a T-pose swings forward about the vertical: {axis:?}");
+    let (low, high) = (limit["low_rad"].as_f64().unwrap(), limit["high_rad"].as_f64().unwrap());
+    assert!((-0.4..0.0).contains(&low) && (2.0..3.1).contains(&high), "{low} {high}");
+}
+
+#[test]
 fn it_rests_unturned_in_a_t_pose_on_the_floor() {
     let bytes = written();
     let file = json(&bytes);

@@ -2,7 +2,7 @@
 //! avatar all speak.
 //!
 //! - [`joint`]: the 52 VRM humanoid joints and their hierarchy;
-//! - [`Skeleton`]: where the joints of one person rest; [`Pose`]: how they are turned;
+//! - [`Skeleton`]: where the joints of one person rest; [`Pose`]: how they are turned; [`joint_limits`]: how far they go;
 //! - [`SkinWeights`] and [`skinning`]: linear blend skinning (Hu et al. 2017, eq. 3) and its inverse;
 //! - [`BodyModel`]: the statistical body (eq. 1 joints by [`mean_value`], eq. 2 shape) from the committed asset ([`asset`]);
 //! - [`dress_pose`]: the A- and T-pose of any skeleton;
@@ -26,6 +26,7 @@ pub mod body_model;
 pub mod dress_pose;
 pub mod error;
 pub mod joint;
+pub mod limits;
 pub mod mean_value;
 pub mod motion;
 pub mod pose;
@@ -37,6 +38,7 @@ pub mod transfer;
 pub use body_model::{BodyModel, JointRegressor, PopulationInfo, Region};
 pub use error::CharacterError;
 pub use joint::{JOINT_COUNT, Joint};
+pub use limits::{JointLimit, joint_limits};
 pub use motion::Motion;
 pub use pose::Pose;
 pub use skeleton::Skeleton;

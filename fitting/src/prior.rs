@@ -1,7 +1,7 @@
 //! What is known before any scan is seen: shape is unit normal, joints stay near a pose and within human limits.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use toile_character::{Joint, Pose, Skeleton};
+use toile_character::{Joint, JointLimit, Pose, Skeleton, joint_limits, limits::shortest};
 
 use crate::{
     articulated::{Columns, Posed, State, left_jacobian_inverse, parent_rotation},
@@ -17,34 +17,26 @@ pub(crate) struct JointPrior {
     pub center: Pose,
     /// Standard deviation of each joint's rotation, radians, by [`Joint::index`].
     pub sigma: Vec<f64>,
-    /// Hinge limits that apply whatever the centre is.
-    limits: Vec<Limit>,
-}
-
-/// Bounds of a rotation vector's component about `axis`, radians.
-struct Limit {
-    joint: Joint,
-    axis: Vector3<f64>,
-    low: f64,
-    high: f64,
+    /// What holds whatever the centre is.
+    limits: Vec<JointLimit>,
 }
 
 impl JointPrior {
     /// The prior of someone standing more or less in the A-pose that the model rests in.
     pub fn standing(skeleton: &Skeleton) -> Self {
         let sigma = toile_character::joint::JOINTS.iter().map(|&j| standing_sigma(j).to_radians()).collect();
-        Self { center: Pose::identity(), sigma, limits: limits(skeleton) }
+        Self { center: Pose::identity(), sigma, limits: joint_limits(skeleton) }
     }
 
     /// Drawn to `center`: body joints by `sigma` radians, wrists and toes half as much, fingers hardly move.
-    pub fn around(center: Pose, sigma: f64) -> Self {
+    pub fn around(center: Pose, sigma: f64, skeleton: &Skeleton) -> Self {
         use Joint::*;
         let of = |j: &Joint| match j {
             j if j.is_finger() => 0.1 * sigma,
             LeftToes | RightToes => 0.5 * sigma,
             _ => sigma,
         };
-        Self { center, sigma: toile_character::joint::JOINTS.iter().map(of).collect(), limits: Vec::new() }
+        Self { center, sigma: toile_character::joint::JOINTS.iter().map(of).collect(), limits: joint_limits(skeleton) }
     }
 
     /// Adds the joints' part of the cost.
@@ -53,29 +45,32 @@ impl JointPrior {
             let Some(at) = columns.of(joint) else { continue };
             let to_local = parent_rotation(joint, &posed.frames).inverse().to_rotation_matrix().into_inner();
             let rotation = state.pose.rotation(joint);
-            let v = shortest(rotation * self.center.rotation(joint).inverse());
+            let v = shortest(&(rotation * self.center.rotation(joint).inverse()));
             let inverse_sigma = 1.0 / self.sigma[joint.index()].max(1e-6);
             let jacobian = left_jacobian_inverse(&v) * to_local * inverse_sigma;
             equations.add_triple(at, &(v * inverse_sigma), &jacobian);
             for limit in self.limits.iter().filter(|l| l.joint == joint) {
-                limit.add(equations, at, &shortest(rotation), &to_local);
+                add_limit(limit, equations, at, &rotation, &to_local);
             }
         }
     }
 }
 
-impl Limit {
-    fn add(&self, equations: &mut NormalEquations, at: usize, v: &Vector3<f64>, to_local: &Matrix3<f64>) {
-        let angle = v.dot(&self.axis);
-        let beyond = (angle - self.high).max(0.0) + (angle - self.low).min(0.0);
-        if beyond == 0.0 {
-            return;
-        }
-        let row = self.axis.transpose() * left_jacobian_inverse(v) * to_local / LIMIT_SIGMA;
-        let mut jacobian = Matrix3::zeros();
-        jacobian.set_row(0, &row);
-        equations.add_triple(at, &Vector3::new(beyond / LIMIT_SIGMA, 0.0, 0.0), &jacobian);
+fn add_limit(
+    limit: &JointLimit,
+    equations: &mut NormalEquations,
+    at: usize,
+    rotation: &UnitQuaternion<f64>,
+    to_local: &Matrix3<f64>,
+) {
+    let beyond = limit.beyond(rotation);
+    if beyond == 0.0 {
+        return;
     }
+    let row = limit.axis.transpose() * left_jacobian_inverse(&shortest(rotation)) * to_local / LIMIT_SIGMA;
+    let mut jacobian = Matrix3::zeros();
+    jacobian.set_row(0, &row);
+    equations.add_triple(at, &Vector3::new(beyond / LIMIT_SIGMA, 0.0, 0.0), &jacobian);
 }
 
 /// β is unit normal by the model's scaling.
@@ -83,12 +78,6 @@ pub(crate) fn add_shape_prior(equations: &mut NormalEquations, state: &State, co
     for (b, &value) in state.beta.iter().take(columns.betas).enumerate() {
         equations.add_single(columns.first_beta() + b, value, sigma);
     }
-}
-
-/// Rotation vector of at most half a turn.
-fn shortest(q: UnitQuaternion<f64>) -> Vector3<f64> {
-    let q = if q.w < 0.0 { UnitQuaternion::new_unchecked(-q.into_inner()) } else { q };
-    q.scaled_axis()
 }
 
 /// Standard deviation of a joint's rotation about the A-pose in someone standing on a turntable, degrees.
@@ -109,35 +98,6 @@ fn standing_sigma(joint: Joint) -> f64 {
         LeftThumbMetacarpal | RightThumbMetacarpal => 8.0,
         _ => 8.0,
     }
-}
-
-/// Knees and elbows are hinges that do not bend backwards; the neck does not turn the head round.
-fn limits(skeleton: &Skeleton) -> Vec<Limit> {
-    use Joint::*;
-    let degrees = |joint, axis: Vector3<f64>, low: f64, high: f64| Limit {
-        joint,
-        axis: axis.try_normalize(1e-9).unwrap_or_default(),
-        low: low.to_radians(),
-        high: high.to_radians(),
-    };
-    let mut out = vec![
-        degrees(LeftLowerLeg, Vector3::x(), -4.0, 150.0),
-        degrees(RightLowerLeg, Vector3::x(), -4.0, 150.0),
-        degrees(Neck, Vector3::y(), -60.0, 60.0),
-        degrees(Head, Vector3::y(), -60.0, 60.0),
-    ];
-    for (elbow, wrist) in [(LeftLowerArm, LeftHand), (RightLowerArm, RightHand)] {
-        let arm = skeleton.position(wrist) - skeleton.position(elbow);
-        out.push(degrees(elbow, arm.cross(&Vector3::z()), -8.0, 150.0));
-    }
-    for (knee, ankle) in [(LeftLowerLeg, LeftFoot), (RightLowerLeg, RightFoot)] {
-        out.push(degrees(knee, skeleton.position(ankle) - skeleton.position(knee), -20.0, 20.0));
-        out.push(degrees(knee, Vector3::z(), -8.0, 8.0));
-    }
-    for foot in [LeftFoot, RightFoot] {
-        out.push(degrees(foot, Vector3::x(), -40.0, 30.0));
-    }
-    out
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
-use toile_character::{Joint, Pose, SkinnedMesh};
+use toile_character::{Joint, Pose, Skeleton, SkinnedMesh};
 use toile_geometry::Mesh;
 
 use crate::{
@@ -74,10 +74,10 @@ pub fn pose_under(
     let starts = headings(&coarse, dressed, initial, settings);
     progress(0.2);
     let middle = Stage::new(&source, &target, &MIDDLE, settings)?;
-    let (mut state, mut iterations) = best_heading(&middle, starts, settings)?;
+    let (mut state, mut iterations) = best_heading(&middle, starts, &dressed.skeleton, settings)?;
     progress(0.6);
     let fine = Stage::new(&source, &target, &FINE, settings)?;
-    let prior = JointPrior::around(state.initial.clone(), settings.joint_sigma);
+    let prior = JointPrior::around(state.initial.clone(), settings.joint_sigma, &dressed.skeleton);
     let end = fine.run(state.now.clone(), &prior, body_joints(), settings.fine_iterations, true)?;
     iterations += end.iterations;
     state.now = end.state;
@@ -145,10 +145,11 @@ fn middle_of(points: &[Point3<f32>], areas: &[f32]) -> Vector3<f64> {
 fn best_heading(
     stage: &Stage,
     candidates: Vec<Candidate>,
+    skeleton: &Skeleton,
     settings: &UnderSettings,
 ) -> Result<(Candidate, usize), FittingError> {
     let run = |mut c: Candidate| -> Result<(f64, usize, Candidate), FittingError> {
-        let prior = JointPrior::around(c.initial.clone(), settings.joint_sigma);
+        let prior = JointPrior::around(c.initial.clone(), settings.joint_sigma, skeleton);
         let rigid = stage.run(c.now, &prior, vec![Joint::Hips], 12, false)?;
         let bent = stage.run(rigid.state, &prior, body_joints(), 8, true)?;
         c.now = bent.state;
