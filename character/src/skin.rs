@@ -52,6 +52,14 @@ impl SkinWeights {
         self.weights.push(weights);
     }
 
+    /// Weights whose vertex i is vertex `old_of_new[i]` of these.
+    pub fn gather(&self, old_of_new: &[u32]) -> Self {
+        Self {
+            joints: old_of_new.iter().map(|&v| self.joints[v as usize]).collect(),
+            weights: old_of_new.iter().map(|&v| self.weights[v as usize]).collect(),
+        }
+    }
+
     /// Influences of vertex `v` with a weight above zero.
     pub fn of(&self, v: usize) -> impl Iterator<Item = (u8, f32)> + '_ {
         self.joints[v].into_iter().zip(self.weights[v]).filter(|i| i.1 > 0.0)

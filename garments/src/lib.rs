@@ -9,7 +9,8 @@
 //!    closed;
 //! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
 //! 5. [`mod@stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests;
-//! 6. [`layer_weights`]: layers close over one another move alike; [`posed`] tells what they do in other poses.
+//! 6. [`layer_weights`]: layers close over one another move alike; [`posed`] tells what they do in other poses;
+//! 7. [`hidden`]: what of the body and of lower layers is never in sight, for exports that leave it out.
 //!
 //! [`edits`] are corrections by hand, applied to the labels each time.
 //!
@@ -36,6 +37,7 @@ pub mod fair;
 pub mod garment_type;
 pub mod hanging;
 pub mod hem;
+pub mod hidden;
 pub mod labels;
 pub mod layer_weights;
 pub mod pile;
@@ -55,8 +57,9 @@ pub use edits::Edits;
 pub use error::GarmentError;
 pub use extract::{Extraction, Take, Warning, extract};
 pub use garment_type::GarmentType;
+pub use hidden::hidden_triangles;
 pub use layer_weights::carry_weights;
 pub use posed::{PosedReport, Worn, posed_report};
-pub use settings::{ExtractSettings, StackSettings};
+pub use settings::{CullSettings, ExtractSettings, StackSettings};
 pub use stack::stack;
 pub use stack_report::{GAP_BINS_MM, LayerReport, StackReport};

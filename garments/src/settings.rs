@@ -79,3 +79,19 @@ impl Default for StackSettings {
         Self { gap: 0.0015, spread: 0.015, rounds: 80, reach: 0.05 }
     }
 }
+
+/// What an export leaves out because clothes hide it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CullSettings {
+    /// What lies nearer to skin or cloth in sight is kept, metres along the surface: so far a hem may move. Default 0.03.
+    pub margin: f32,
+    /// Cloth this far off still hides, metres. Default 0.1.
+    pub reach: f32,
+}
+
+impl Default for CullSettings {
+    fn default() -> Self {
+        Self { margin: 0.03, reach: 0.1 }
+    }
+}

@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use toile_character::BodyModel;
 use toile_fusion::FusionSettings;
+use toile_garments::CullSettings;
 
 use crate::{Progress, StudioError, stage::Record};
 
@@ -51,6 +52,8 @@ pub struct Options {
     pub fusion: FusionSettings,
     /// Stop after this layer; without, all of them.
     pub last_layer: Option<String>,
+    /// Leave out of the avatar what clothes hide; without, it is whole.
+    pub cull: Option<CullSettings>,
 }
 
 impl Options {
@@ -127,7 +130,8 @@ fn dress(
     }
     summary.add("layers", "stack", stack::run(run, &body)?);
     if goal >= Goal::Avatar {
-        summary.add("avatar", "export", deliverables::run(run, &body, options.motion.as_deref())?);
+        let record = deliverables::run(run, &body, options.motion.as_deref(), options.cull.as_ref())?;
+        summary.add("avatar", "export", record);
     }
     if goal >= Goal::Report {
         page::run(run, &body, options.motion.as_deref(), summary)?;

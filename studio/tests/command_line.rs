@@ -81,6 +81,16 @@ fn a_motion_that_cannot_be_used_is_said_before_any_work() {
 }
 
 #[test]
+fn a_margin_needs_culling_and_is_a_length() {
+    let subject = tempfile::tempdir().unwrap();
+    let export = |words: &[&str]| exits(2, toile().arg("export").arg(subject.path()).args(words));
+    export(&["--cull-margin", "50"]);
+    export(&["--cull-hidden", "--mcap", "plain.mcap"]);
+    let answer = export(&["--cull-hidden", "--cull-margin", "5000"]);
+    assert!(answer["error"]["message"].as_str().unwrap().contains("--cull-margin 5000"), "{answer}");
+}
+
+#[test]
 fn edits_that_cannot_be_used_are_named_and_not_kept() {
     let recording = common::Recording::new(3, 3);
     exits(0, toile().args(recording.import("body")));

@@ -5,8 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde_json::json;
+use serde_json::{Value, json};
 use toile_capture::{Replay, export_standard};
+use toile_garments::CullSettings;
 
 use crate::{
     StudioError,
@@ -21,9 +22,14 @@ const AFTER: &str = "\
 A subject's avatar.glb (pose of the first scan, with the motion as a clip) and avatar.vrm (T-pose) are written into its
 folder; what is missing before is run. A recording can be converted so that other viewers of MCAP show its depth.
 
+With --cull-hidden both files lack what no one can see under closed cloth: body and lower layers end --cull-margin
+inside of each hem, collar and cuff. Head, hands and feet stay, and what only loose or open cloth covers. The files are
+smaller, and nothing can poke through where nothing is; export again without it for whole layers.
+
 Examples:
   toile export anna --motion dance.bvh
   toile export anna --glb anna-today.glb
+  toile export anna --cull-hidden --cull-margin 50
   toile export anna/takes/00-body.mcap --mcap plain.mcap";
 
 /// Write the avatar: GLB with a motion, VRM; or a take in a plain encoding
@@ -41,8 +47,14 @@ pub struct Export {
     /// Put a copy of the VRM here
     #[arg(long, value_name = "FILE")]
     vrm: Option<PathBuf>,
+    /// Leave out triangles of body and lower layers that clothes hide
+    #[arg(long)]
+    cull_hidden: bool,
+    /// Keep this much inside of hems and openings, along the surface [default: 30]
+    #[arg(long, value_name = "MM", requires = "cull_hidden")]
+    cull_margin: Option<f32>,
     /// Convert a recording: depth as plain 16-bit images (16UC1), which other viewers display
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "glb", "vrm"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "glb", "vrm", "cull_hidden"])]
     mcap: Option<PathBuf>,
 }
 
@@ -56,7 +68,7 @@ impl Export {
         if let Some(plain) = &self.mcap {
             return convert(&self.path, plain);
         }
-        let options = Options { motion: self.motion.clone(), ..Options::default() };
+        let options = Options { motion: self.motion.clone(), cull: self.cull()?, ..Options::default() };
         options.check()?;
         let mut answer = reach(&self.path, Goal::Avatar, &options, session)?;
         for (copy, name) in [(&self.glb, "avatar.glb"), (&self.vrm, "avatar.vrm")] {
@@ -66,8 +78,27 @@ impl Export {
             disk::write_whole(copy, &bytes)?;
             answer.text.push_str(&format!("{}\n", copy.display()));
         }
+        answer.text.push_str(&left_out(&answer.results));
         Ok(answer)
     }
+
+    fn cull(&self) -> Result<Option<CullSettings>, StudioError> {
+        let defaults = CullSettings::default();
+        let margin = self.cull_margin.map_or(defaults.margin, |mm| mm * 1e-3);
+        if !(0.0..=1.0).contains(&margin) {
+            return Err(StudioError::Usage(format!("--cull-margin {} is not between 0 and 1000 mm", margin * 1e3)));
+        }
+        Ok(self.cull_hidden.then_some(CullSettings { margin, ..defaults }))
+    }
+}
+
+/// A line a layer of which something was left out.
+fn left_out(results: &Value) -> String {
+    let layers = results["stages"]["avatar/export"]["left_out"].as_object();
+    let line = |(layer, told): (&String, &Value)| {
+        format!("{layer}: {} of {} triangles left out\n", told["triangles"], told["of"])
+    };
+    layers.into_iter().flatten().filter(|(_, told)| told["triangles"] != 0).map(line).collect()
 }
 
 fn convert(recording: &Path, plain: &Path) -> Result<Answer, StudioError> {

@@ -1,18 +1,20 @@
 //! Stage `export`: the dressed avatar as files.
 //!
-//! Reads the body, every garment with its weights, and the motion. Writes `avatar.glb` and `avatar.vrm`.
+//! Reads the body, every garment with its weights, and the motion. Writes `avatar.glb` and `avatar.vrm`, on request
+//! without what clothes hide.
 
 use std::path::Path;
 
-use serde_json::json;
+use serde_json::{Value, json};
 use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, write_glb, write_vrm};
 use toile_character::{Pose, Skeleton, SkinWeights};
+use toile_garments::{CullSettings, GarmentError, Worn, hidden_triangles};
 use toile_geometry::Mesh;
 
 use crate::{
     StudioError,
     pipeline::{Run, body_file::Body, motion, skin_attributes::take_weights},
-    stage::{Product, Record, Stage},
+    stage::{Product, Record, Stage, plain},
 };
 
 /// Raised whenever the same inputs and settings give other files.
@@ -20,16 +22,22 @@ const VERSION: u32 = 2;
 /// Expected seconds.
 pub const COST: f64 = 0.5;
 
-/// Writes the avatar's files, unless they are up to date. `bvh` is the motion; without it, the shipped walk.
+/// Writes the avatar's files, unless they are up to date. `bvh` is the motion; without it, the shipped walk. With `cull`,
+/// triangles that clothes hide are left out and counted.
 ///
 /// # Errors
 /// [`StudioError`] where the motion cannot be used or files cannot be read or written.
-pub fn run(run: &Run, body: &Body, bvh: Option<&Path>) -> Result<Record, StudioError> {
+pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, cull: Option<&CullSettings>) -> Result<Record, StudioError> {
     let folders = &run.folders;
     let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
     inputs.extend(run.garments().map(|l| folders.garment(l)));
     inputs.extend(bvh.map(Path::to_path_buf));
     let types: Vec<Option<String>> = (0..run.layers.len()).map(|n| garment_type(run, n)).collect();
+    let mut settings =
+        json!({ "name": run.title(), "types": types, "retarget": motion::settings(), "vrm": VrmMeta::default() });
+    if let Some(cull) = cull {
+        settings["cull"] = plain(cull)?;
+    }
     let stage = Stage {
         name: "export",
         version: VERSION,
@@ -37,24 +45,25 @@ pub fn run(run: &Run, body: &Body, bvh: Option<&Path>) -> Result<Record, StudioE
         root: &folders.root,
         folder: folders.avatar(),
         inputs,
-        settings: json!({ "name": run.title(), "types": types, "retarget": motion::settings(), "vrm": VrmMeta::default() }),
+        settings,
         outputs: vec![folders.glb(), folders.vrm()],
         outputs_vary: false,
     };
     stage.run(&run.label("avatar", "export"), run.progress, |progress| {
         let moved = motion::load(bvh, &body.skinned.skeleton)?;
         let mut avatar = dressed(run, body, &types)?;
+        let mut result = json!({ "motion": moved.report });
+        if let Some(cull) = cull {
+            result["left_out"] =
+                leave_out_hidden(&mut avatar, cull).map_err(|e| StudioError::stage(&folders.glb(), e))?;
+        }
         progress(0.3);
         avatar.motions.push(moved.motion);
         let wrong = |e: AvatarError| StudioError::stage(&folders.glb(), e);
         let glb = write_glb(&avatar).map_err(wrong)?;
         progress(0.6);
         let vrm = write_vrm(&avatar, &VrmMeta::default()).map_err(wrong)?;
-        Ok(Product {
-            files: vec![(folders.glb(), glb), (folders.vrm(), vrm)],
-            result: json!({ "motion": moved.report }),
-            ..Product::default()
-        })
+        Ok(Product { files: vec![(folders.glb(), glb), (folders.vrm(), vrm)], result, ..Product::default() })
     })
 }
 
@@ -104,6 +113,22 @@ fn dressed(run: &Run, body: &Body, types: &[Option<String>]) -> Result<Avatar, S
     Ok(Avatar { name: run.title().to_string(), skeleton, pose0, layers, motions: Vec::new() })
 }
 
+/// Takes triangles that clothes hide off every layer, and vertices that none uses any more; a layer of which nothing is
+/// left goes as a whole. Returns how many triangles of how many were left out, by layer.
+fn leave_out_hidden(avatar: &mut Avatar, settings: &CullSettings) -> Result<Value, GarmentError> {
+    let worn: Vec<Worn> = avatar.layers.iter().map(|l| Worn { mesh: &l.mesh, weights: &l.weights }).collect();
+    let hidden = hidden_triangles(&worn, settings)?;
+    let mut told = json!({});
+    for (layer, hidden) in avatar.layers.iter_mut().zip(&hidden) {
+        let (mesh, old_of_new) = layer.mesh.filter_triangles(|t| !hidden[t]);
+        let (all, left) = (hidden.len(), mesh.triangles.len());
+        told[&layer.name] = json!({ "triangles": all - left, "of": all });
+        (layer.mesh, layer.weights) = (mesh, layer.weights.gather(&old_of_new));
+    }
+    avatar.layers.retain(|l| !l.mesh.is_empty());
+    Ok(told)
+}
+
 /// The told type of take `n`'s garment, else the one that the stage `cut` guessed.
 fn garment_type(run: &Run, n: usize) -> Option<String> {
     let told = run.garment_type(n).map(|t| t.to_string());
@@ -112,4 +137,50 @@ fn garment_type(run: &Run, n: usize) -> Option<String> {
             crate::pipeline::body_file::read_json(&run.folders.layer(&run.layers[n]).join("report.json")).ok()?;
         Some(report["stages"]["cut"]["result"]["garment_type"].as_str()?.to_string())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+    use toile_character::JOINT_COUNT;
+
+    use super::*;
+
+    /// A square sheet over the floor at height `y`, facing up, a vertex every 20 mm.
+    fn sheet(name: &str, order: u32, y: f32, cells: u32) -> AvatarLayer {
+        let side = cells + 1;
+        let at = |i: u32| (i as f32 - cells as f32 / 2.0) * 0.02;
+        let positions = (0..side * side).map(|v| Point3::new(at(v % side), y, at(v / side))).collect();
+        let corner = |c: u32| c / cells * side + c % cells;
+        let cell = |c: u32| {
+            let [a, b, c, d] = [corner(c), corner(c) + 1, corner(c) + side, corner(c) + side + 1];
+            [[a, c, d], [a, d, b]]
+        };
+        let mesh = Mesh::new(positions, (0..cells * cells).flat_map(cell).collect());
+        let mut weights = SkinWeights::default();
+        (0..side * side).for_each(|v| weights.push(&[(0, 1.0 + v as f32), (1, 1.0)]));
+        AvatarLayer { name: name.into(), mesh, weights, order, garment: None, thickness: None }
+    }
+
+    #[test]
+    fn hidden_triangles_go_with_their_vertices_and_weights() {
+        let (vest, coat) = (sheet("01-vest", 1, 0.002, 4), sheet("02-coat", 2, 0.004, 20));
+        let body = sheet("body", 0, 0.0, 30);
+        let skeleton = Skeleton { rest: [Point3::origin(); JOINT_COUNT] };
+        let layers = vec![body.clone(), vest, coat.clone()];
+        let mut avatar = Avatar { name: "anna".into(), skeleton, pose0: Pose::identity(), layers, motions: Vec::new() };
+        let told = leave_out_hidden(&mut avatar, &CullSettings { margin: 0.03, reach: 0.1 }).unwrap();
+        avatar.validate().unwrap();
+        assert_eq!(avatar.layers.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["body", "02-coat"]);
+        assert_eq!(told["01-vest"], json!({ "triangles": 32, "of": 32 }));
+        assert_eq!(told["02-coat"], json!({ "triangles": 0, "of": 800 }));
+        let left = &avatar.layers[0];
+        assert_eq!(told["body"], json!({ "triangles": 1800 - left.mesh.triangles.len(), "of": 1800 }));
+        assert!((1000..1600).contains(&left.mesh.triangles.len()), "{told}");
+        assert!(left.mesh.positions.len() < body.mesh.positions.len());
+        for (v, p) in left.mesh.positions.iter().enumerate() {
+            let old = body.mesh.positions.iter().position(|q| q == p).unwrap();
+            assert_eq!(left.weights.weights[v], body.weights.weights[old]);
+        }
+    }
 }
