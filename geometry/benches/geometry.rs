@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Point3;
-use toile_geometry::{Mesh, decimate::decimate};
+use toile_geometry::{Mesh, bvh::Bvh, decimate::decimate};
 
 /// A closed torus of `rings` by `sides` quads with folds and noise, 1.5 m across, with colours.
 fn folded_torus(rings: u32, sides: u32) -> Mesh {
@@ -41,5 +41,14 @@ fn decimation(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, decimation);
+fn hierarchy(c: &mut Criterion) {
+    let mesh = folded_torus(160, 160);
+    let mut tree = Bvh::new(&mesh.positions, &mesh.triangles);
+    let mut group = c.benchmark_group("geometry/bvh");
+    group.bench_function("build/51k", |b| b.iter(|| Bvh::new(black_box(&mesh.positions), &mesh.triangles)));
+    group.bench_function("refit/51k", |b| b.iter(|| tree.refit(black_box(&mesh.positions), &mesh.triangles)));
+    group.finish();
+}
+
+criterion_group!(benches, decimation, hierarchy);
 criterion_main!(benches);

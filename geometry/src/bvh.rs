@@ -82,10 +82,35 @@ impl Bvh {
         let mut nodes = Vec::new();
         if !all.is_empty() {
             nodes.resize(node_counts(all.len()).0, Node::EMPTY);
-            build(&mut nodes, &mut order, (0, 0), &all, &centroids);
+            divide(&mut nodes, &mut order, (0, 0), &centroids);
         }
         let corners = order.iter().map(|&t| all[t as usize]).collect();
-        Self { nodes, order, corners }
+        let mut tree = Self { nodes, order, corners };
+        tree.summarise();
+        tree
+    }
+
+    /// Takes over moved `positions` of the mesh it was built from, and keeps the division: a fraction of the cost of
+    /// building anew. Queries stay exact; they get slower where neighbours in space have become others. O(n).
+    pub fn refit(&mut self, positions: &[Point3<f32>], triangles: &[[u32; 3]]) {
+        for (corners, &t) in self.corners.iter_mut().zip(&self.order) {
+            *corners = triangles[t as usize].map(|v| positions[v as usize]);
+        }
+        self.summarise();
+    }
+
+    /// Sums up every node's triangles, leaves first: children follow their parents.
+    fn summarise(&mut self) {
+        let mut sums = vec![Sum::default(); self.nodes.len()];
+        for n in (0..self.nodes.len()).rev() {
+            let (start, count) = (self.nodes[n].start as usize, self.nodes[n].count as usize);
+            sums[n] = if count > 0 {
+                self.corners[start..start + count].iter().fold(Sum::default(), |sum, corners| sum.with(corners))
+            } else {
+                sums[n + 1].merged(&sums[start])
+            };
+            sums[n].write(&mut self.nodes[n]);
+        }
     }
 
     /// The closest point within `max_distance`, or `None`. Of equally near triangles the first met wins.
@@ -255,17 +280,11 @@ fn node_counts(count: usize) -> (usize, usize) {
     (if count == LEAF { 1 } else { 1 + here }, 1 + next)
 }
 
-/// Fills `nodes` (all those over `order`); `at` is the index of the first node and of the first entry of the order.
-fn build(
-    nodes: &mut [Node],
-    order: &mut [u32],
-    at: (usize, usize),
-    all: &[[Point3<f32>; 3]],
-    centroids: &[Point3<f32>],
-) {
+/// Divides the triangles `order` among `nodes` (all those over them, still without bounds); `at` is the index of the
+/// first node and of the first entry of the order.
+fn divide(nodes: &mut [Node], order: &mut [u32], at: (usize, usize), centroids: &[Point3<f32>]) {
     let count = order.len();
     let (node, below) = nodes.split_at_mut(1);
-    node[0] = summary(order, all);
     if count <= LEAF {
         (node[0].start, node[0].count) = (at.1 as u32, count as u32);
         return;
@@ -280,8 +299,8 @@ fn build(
     let (left_nodes, right_nodes) = below.split_at_mut(node_counts(middle).0);
     let right_at = (at.0 + 1 + left_nodes.len(), at.1 + middle);
     node[0].start = right_at.0 as u32;
-    let mut low = || build(left_nodes, left, (at.0 + 1, at.1), all, centroids);
-    let mut high = || build(right_nodes, right, right_at, all, centroids);
+    let mut low = || divide(left_nodes, left, (at.0 + 1, at.1), centroids);
+    let mut high = || divide(right_nodes, right, right_at, centroids);
     if count > PARALLEL {
         rayon::join(low, high);
     } else {
@@ -290,28 +309,55 @@ fn build(
     }
 }
 
-fn summary(order: &[u32], all: &[[Point3<f32>; 3]]) -> Node {
-    let first = all[order[0] as usize][0];
-    let mut node = Node { lo: first, hi: first, ..Node::EMPTY };
-    let (mut dipole, mut center, mut area) = (Vector3::<f64>::zeros(), Vector3::<f64>::zeros(), 0.0);
-    for &t in order {
-        let corners = &all[t as usize];
-        for p in corners {
-            node.lo = node.lo.inf(p);
-            node.hi = node.hi.sup(p);
-        }
+/// What a node says about the triangles below it, before division.
+#[derive(Debug, Clone, Copy)]
+struct Sum {
+    lo: Point3<f32>,
+    hi: Point3<f32>,
+    dipole: Vector3<f64>,
+    /// Sum of centres times areas.
+    center: Vector3<f64>,
+    area: f64,
+}
+
+impl Default for Sum {
+    fn default() -> Self {
+        let (lo, hi) = ([f32::INFINITY; 3].into(), [f32::NEG_INFINITY; 3].into());
+        Self { lo, hi, dipole: Vector3::zeros(), center: Vector3::zeros(), area: 0.0 }
+    }
+}
+
+impl Sum {
+    fn with(self, corners: &[Point3<f32>; 3]) -> Self {
         let [a, b, c] = corners.map(|p| p.coords.cast::<f64>());
         let n = (b - a).cross(&(c - a)) * 0.5;
-        dipole += n;
-        center += (a + b + c) / 3.0 * n.norm();
-        area += n.norm();
+        Self {
+            lo: corners.iter().fold(self.lo, |lo, p| lo.inf(p)),
+            hi: corners.iter().fold(self.hi, |hi, p| hi.sup(p)),
+            dipole: self.dipole + n,
+            center: self.center + (a + b + c) / 3.0 * n.norm(),
+            area: self.area + n.norm(),
+        }
     }
-    node.dipole = dipole.cast();
-    node.center =
-        if area > 0.0 { Point3::from((center / area).cast::<f32>()) } else { nalgebra::center(&node.lo, &node.hi) };
-    let far = (node.hi - node.center).sup(&(node.center - node.lo));
-    node.radius = far.norm();
-    node
+
+    fn merged(&self, other: &Self) -> Self {
+        Self {
+            lo: self.lo.inf(&other.lo),
+            hi: self.hi.sup(&other.hi),
+            dipole: self.dipole + other.dipole,
+            center: self.center + other.center,
+            area: self.area + other.area,
+        }
+    }
+
+    fn write(&self, node: &mut Node) {
+        (node.lo, node.hi, node.dipole) = (self.lo, self.hi, self.dipole.cast());
+        node.center = match self.area > 0.0 {
+            true => Point3::from((self.center / self.area).cast::<f32>()),
+            false => nalgebra::center(&self.lo, &self.hi),
+        };
+        node.radius = (self.hi - node.center).sup(&(node.center - self.lo)).norm();
+    }
 }
 
 #[inline]
@@ -415,6 +461,22 @@ mod tests {
                 .fold(f32::INFINITY, f32::min);
             let found = bvh.ray(&p, &d, f32::INFINITY).map_or(f32::INFINITY, |h| h.t);
             assert!(found == brute || (found - brute).abs() < 1e-5, "{found} against {brute}");
+        }
+    }
+
+    #[test]
+    fn refitted_answers_as_built_anew() {
+        let (mut positions, triangles) = sphere(3);
+        let mut refitted = Bvh::new(&positions, &triangles);
+        positions.iter_mut().for_each(|p| *p = Point3::new(p.x * 1.3 + 0.2 * p.y, p.y, p.z * 0.8 - 0.1));
+        refitted.refit(&positions, &triangles);
+        let built = Bvh::new(&positions, &triangles);
+        for p in probes() {
+            let of = |tree: &Bvh| tree.closest(&p, f32::INFINITY).unwrap().distance;
+            assert!((of(&refitted) - of(&built)).abs() < 1e-6);
+            let of = |tree: &Bvh| tree.ray(&p, &-p.coords, f32::INFINITY).map(|h| h.t);
+            assert_eq!(of(&refitted), of(&built));
+            assert!((refitted.winding_number(&p) - built.winding_number(&p)).abs() < 0.02);
         }
     }
 
