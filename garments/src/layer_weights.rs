@@ -2,10 +2,13 @@
 //! is near, so that what does not cross in one pose does hardly cross in another.
 
 use rayon::prelude::*;
-use toile_character::{SkinWeights, joint::JOINT_COUNT};
+use toile_character::{Pose, Skeleton, SkinWeights, joint::JOINT_COUNT};
 use toile_geometry::{Mesh, bvh::Bvh};
 
-use crate::{GarmentError, common_frame::push_continuous, hanging::FREE_PART, surface_solve::SurfaceSystem};
+use crate::{
+    GarmentError, common_frame::push_continuous, hanging::FREE_PART, limit_stretch::limit_stretch,
+    surface_solve::SurfaceSystem,
+};
 
 /// Nearer than the first a vertex has the weights of the layer below; further than the second its own; metres.
 const NEAR: [f32; 2] = [0.015, 0.03];
@@ -14,20 +17,27 @@ const SMOOTHING: f32 = 0.008;
 /// Surfaces face alike up to this angle (cosine).
 const FACING: f32 = 0.3;
 
-/// Gives each of the `layers` (inside to outside, stacked, with their `weights`) the weights of the nearest layer below
-/// where that is close. Layers over bare body keep their own weights, and so does what hangs free ([`FREE_PART`]).
+/// Gives each of the `layers` (inside to outside, stacked in `pose0`, with their `weights`) the weights of the nearest
+/// layer below where that is close. Layers over bare body keep their own weights, and so does what hangs free
+/// ([`FREE_PART`]), as far as it bears a stride ([`limit_stretch`]).
 ///
 /// # Errors
 /// [`GarmentError::Mismatch`] where a layer has not as many weights as vertices.
-pub fn carry_weights(layers: &[Mesh], weights: &mut [SkinWeights]) -> Result<(), GarmentError> {
+pub fn carry_weights(
+    layers: &[Mesh],
+    weights: &mut [SkinWeights],
+    skeleton: &Skeleton,
+    pose0: &Pose,
+) -> Result<(), GarmentError> {
     if let Some((mesh, w)) = layers.iter().zip(weights.iter()).find(|(m, w)| m.positions.len() != w.len()) {
         let reason = format!("a layer has {} vertices but weights for {}", mesh.positions.len(), w.len());
         return Err(GarmentError::Mismatch(reason));
     }
-    for k in 1..layers.len().min(weights.len()) {
+    for (k, layer) in layers.iter().enumerate().take(weights.len()) {
         let (below, rest) = weights.split_at_mut(k);
         let lowers: Vec<Lower> = layers[..k].iter().zip(below.iter()).map(|(m, w)| Lower::new(m, w)).collect();
-        rest[0] = carried(&layers[k], &rest[0], &lowers);
+        rest[0] = carried(layer, &rest[0], &lowers);
+        limit_stretch(layer, &mut rest[0], skeleton, pose0);
     }
     Ok(())
 }
@@ -104,6 +114,10 @@ mod tests {
 
     use super::*;
 
+    fn skeleton() -> Skeleton {
+        Skeleton { rest: [Point3::origin(); JOINT_COUNT] }
+    }
+
     /// A sheet of 20 × 20 squares of 10 mm at height `z`, all on one joint.
     fn sheet(z: f32, joint: u8) -> (Mesh, SkinWeights) {
         let n = 21u32;
@@ -123,7 +137,7 @@ mod tests {
         for (z, expected) in [(0.01, 1), (0.2, 2)] {
             let ((a, wa), (b, wb)) = (sheet(0.0, 1), sheet(z, 2));
             let mut weights = [wa.clone(), wb];
-            carry_weights(&[a, b], &mut weights).unwrap();
+            carry_weights(&[a, b], &mut weights, &skeleton(), &Pose::identity()).unwrap();
             assert_eq!(weights[0], wa);
             assert!(weights[1].joints.iter().all(|j| j[0] == expected), "{z}");
         }
@@ -132,7 +146,7 @@ mod tests {
     #[test]
     fn weights_of_another_mesh_are_refused() {
         let (mesh, _) = sheet(0.0, 1);
-        let refused = carry_weights(&[mesh], &mut [SkinWeights::default()]);
+        let refused = carry_weights(&[mesh], &mut [SkinWeights::default()], &skeleton(), &Pose::identity());
         assert!(matches!(refused, Err(GarmentError::Mismatch(_))));
     }
 }

@@ -9,7 +9,8 @@
 //!    closed;
 //! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
 //! 5. [`mod@stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests;
-//! 6. [`layer_weights`]: layers close over one another move alike; [`posed`] tells what they do in other poses;
+//! 6. [`mod@limit_stretch`] and [`layer_weights`]: cloth that no stride tears, and layers close over one another move
+//!    alike; [`posed`] tells what they do in other poses;
 //! 7. [`hidden`]: what of the body and of lower layers is never in sight, for exports that leave it out.
 //!
 //! [`edits`] are corrections by hand, applied to the labels each time.
@@ -40,6 +41,7 @@ pub mod hem;
 pub mod hidden;
 pub mod labels;
 pub mod layer_weights;
+pub mod limit_stretch;
 pub mod pile;
 pub mod posed;
 pub mod push;
@@ -59,6 +61,7 @@ pub use extract::{Extraction, Take, Warning, extract};
 pub use garment_type::GarmentType;
 pub use hidden::hidden_triangles;
 pub use layer_weights::carry_weights;
+pub use limit_stretch::limit_stretch;
 pub use posed::{PosedReport, Worn, posed_report};
 pub use settings::{CullSettings, ExtractSettings, StackSettings};
 pub use stack::stack;

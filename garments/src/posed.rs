@@ -5,6 +5,12 @@ use serde::Serialize;
 use toile_character::{Pose, Skeleton, SkinWeights, skinning};
 use toile_geometry::{Mesh, bvh::Bvh, intersection::crossings};
 
+/// A triangle stretched further than this counts as torn.
+pub const TORN: f32 = 3.0;
+
+/// Triangles of two layers this near lie over one another, metres: what is further apart belongs to other limbs.
+const OVER: f32 = 0.04;
+
 /// A layer with its weights.
 #[derive(Debug, Clone, Copy)]
 pub struct Worn<'a> {
@@ -19,14 +25,19 @@ pub struct Worn<'a> {
 pub struct PosedReport {
     /// Poses that were looked at.
     pub poses: usize,
-    /// Pairs of triangles that cross with any layer below: mean over the poses.
+    /// Pairs of triangles that poke through a layer below: they cross, and lie close over one another in the pose that
+    /// all are given in. Mean over the poses.
     pub crossing_pairs_mean: f32,
     /// The same in the worst pose.
     pub crossing_pairs_most: usize,
-    /// Share of the layer's triangles that cross, over all poses.
+    /// Share of the layer's triangles that poke through, over all poses.
     pub crossing_share: f32,
+    /// Other pairs that cross: of limbs that meet, as a sleeve and the side. Mean over the poses.
+    pub touching_pairs_mean: f32,
     /// Largest stretch of a triangle in any direction, in any pose; 1 is none.
     pub stretch_most: f32,
+    /// Triangles stretched beyond [`TORN`], in the worst pose.
+    pub torn_most: usize,
 }
 
 /// Poses the layers (the body first, then inside to outside, all in `pose0`) by their weights.
@@ -46,12 +57,18 @@ pub fn posed_report(layers: &[Worn], skeleton: &Skeleton, pose0: &Pose, poses: &
             .collect();
         let trees: Vec<Bvh> = posed.iter().map(|m| Bvh::new(&m.positions, &m.triangles)).collect();
         for k in 0..layers.len() {
-            let pairs: Vec<[u32; 2]> = (0..k).flat_map(|l| crossings(&posed[k], &posed[l], &trees[l])).collect();
+            let by_lower = (0..k).map(|l| (l, crossings(&posed[k], &posed[l], &trees[l])));
+            let all = by_lower.flat_map(|(l, pairs)| pairs.into_iter().map(move |pair| (l, pair)));
+            let over = |(l, pair): &(usize, [u32; 2])| lies_over(layers[k].mesh, layers[*l].mesh, *pair);
+            let (pairs, touching): (Vec<_>, Vec<_>) = all.partition(over);
             let report = &mut reports[k];
+            report.touching_pairs_mean += touching.len() as f32 / poses.len() as f32;
             report.crossing_pairs_mean += pairs.len() as f32 / poses.len() as f32;
             report.crossing_pairs_most = report.crossing_pairs_most.max(pairs.len());
-            report.stretch_most = report.stretch_most.max(most_stretch(layers[k].mesh, &posed[k].positions));
-            let mut of_upper: Vec<u32> = pairs.iter().map(|p| p[0]).collect();
+            let stretch: Vec<f32> = stretches(layers[k].mesh, &posed[k].positions).collect();
+            report.stretch_most = stretch.iter().copied().fold(report.stretch_most, f32::max);
+            report.torn_most = report.torn_most.max(stretch.iter().filter(|s| **s > TORN).count());
+            let mut of_upper: Vec<u32> = pairs.iter().map(|(_, pair)| pair[0]).collect();
             of_upper.sort_unstable();
             of_upper.dedup();
             crossing[k] += of_upper.len();
@@ -63,14 +80,21 @@ pub fn posed_report(layers: &[Worn], skeleton: &Skeleton, pose0: &Pose, poses: &
     reports
 }
 
-/// The largest stretch of any triangle of `mesh` in any direction when its vertices lie at `positions`: the larger
-/// singular value of the triangle's deformation.
-pub fn most_stretch(mesh: &Mesh, positions: &[Point3<f32>]) -> f32 {
-    let stretch = |t: &[u32; 3]| {
+/// True where the triangles of a pair lie close over one another, facing alike.
+fn lies_over(upper: &Mesh, lower: &Mesh, [t, u]: [u32; 2]) -> bool {
+    let (x, y) = (upper.corners(t as usize), lower.corners(u as usize));
+    let center = |c: &[Point3<f32>; 3]| (c[0].coords + c[1].coords + c[2].coords) / 3.0;
+    let normal = |c: &[Point3<f32>; 3]| (c[1] - c[0]).cross(&(c[2] - c[0]));
+    (center(&x) - center(&y)).norm() < OVER && normal(&x).dot(&normal(&y)) > 0.0
+}
+
+/// The largest stretch of each triangle of `mesh` in any direction when its vertices lie at `positions`: the larger
+/// singular value of the triangle's deformation; 0 for a triangle of no area.
+pub fn stretches<'a>(mesh: &'a Mesh, positions: &'a [Point3<f32>]) -> impl Iterator<Item = f32> + 'a {
+    mesh.triangles.iter().map(|t| {
         let at = |p: &[Point3<f32>]| t.map(|v| p[v as usize]);
         triangle_stretch(&at(&mesh.positions), &at(positions))
-    };
-    mesh.triangles.iter().map(stretch).fold(0.0, f32::max)
+    })
 }
 
 /// Larger singular value of the linear map from triangle `from` to triangle `to`, each in its own plane; 0 for a
@@ -97,7 +121,7 @@ mod tests {
             vec![[0, 1, 2]],
         );
         let stretched: Vec<Point3<f32>> = mesh.positions.iter().map(|p| Point3::new(p.x, 0.0, 2.5 * p.y)).collect();
-        assert!((most_stretch(&mesh, &stretched) - 2.5).abs() < 1e-4);
-        assert!((most_stretch(&mesh, &mesh.positions) - 1.0).abs() < 1e-5);
+        assert!((stretches(&mesh, &stretched).next().unwrap() - 2.5).abs() < 1e-4);
+        assert!((stretches(&mesh, &mesh.positions).next().unwrap() - 1.0).abs() < 1e-5);
     }
 }
