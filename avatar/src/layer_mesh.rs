@@ -1,4 +1,4 @@
-//! One layer as a glTF mesh: positions, normals, linear colours, skin weights, indices.
+//! One layer as a glTF mesh: positions, normals, linear colours, skin weights, where it hangs free (`_FREE`), indices.
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -8,6 +8,9 @@ use crate::{
     AvatarLayer,
     buffer::{Buffer, Shape, Target},
 };
+
+/// The mesh attribute that is 1 where a skirt or dress hangs free of the body, 0 where it lies close (Hu et al. 2017, §6.2).
+const FREE: &str = "free";
 
 /// Appends the layer's arrays to `buffer`; returns the glTF mesh, which uses material `material`.
 pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buffer) -> Value {
@@ -25,6 +28,9 @@ pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buff
     if !mesh.colors.is_empty() {
         let colors = buffer.add(&linear_colors(&mesh.colors), Shape::Vec4, Target::Vertices);
         attributes["COLOR_0"] = json!(buffer.normalized(colors));
+    }
+    if let Some(free) = mesh.attributes.get(FREE) {
+        attributes["_FREE"] = json!(buffer.add(free, Shape::Scalar, Target::Vertices));
     }
     json!({
         "name": layer.name,
@@ -48,7 +54,7 @@ pub(crate) fn material(layer: &AvatarLayer) -> Value {
     })
 }
 
-/// What importers cannot know: order of dressing, type of garment, thickness.
+/// What importers cannot know: order of dressing, type of garment, thickness, how much of it hangs free.
 pub(crate) fn extras(layer: &AvatarLayer) -> Value {
     let mut extras = json!({ "layer": layer.order });
     if let Some(garment) = &layer.garment {
@@ -57,6 +63,10 @@ pub(crate) fn extras(layer: &AvatarLayer) -> Value {
     if let Some(thickness) = layer.thickness {
         // shortest decimal of the f32, not its binary expansion
         extras["thickness_m"] = thickness.to_string().parse::<f64>().map_or(Value::Null, |t| json!(t));
+    }
+    if let Some(free) = layer.mesh.attributes.get(FREE).filter(|free| !free.is_empty()) {
+        let share = free.iter().map(|f| f64::from(*f)).sum::<f64>() / free.len() as f64;
+        extras["free_percent"] = json!((share * 100.0).round() as u32);
     }
     extras
 }

@@ -114,6 +114,27 @@ fn every_layer_is_a_mesh_node_of_its_name_on_one_skin() {
 }
 
 #[test]
+fn what_hangs_free_is_told_by_vertex_and_as_a_share() {
+    let mut avatar = dressed();
+    let mesh = &mut avatar.layers[1].mesh;
+    let free: Vec<f32> = (0..mesh.positions.len()).map(|v| f32::from(u8::from(v % 4 == 0))).collect();
+    mesh.attributes.insert("free".into(), free.clone());
+    let glb = write_glb(&avatar).unwrap();
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let json: serde_json::Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    let accessor = |mesh: usize| json["meshes"][mesh]["primitives"][0]["attributes"]["_FREE"].as_u64();
+    assert_eq!((accessor(0), accessor(2)), (None, None));
+    let view = &json["bufferViews"][accessor(1).unwrap() as usize];
+    let start = 20 + length + 8 + view["byteOffset"].as_u64().unwrap() as usize;
+    let bytes = &glb[start..start + view["byteLength"].as_u64().unwrap() as usize];
+    let read: Vec<f32> = bytes.chunks(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+    assert_eq!(read, free);
+    let file = import(&glb);
+    let extras = mesh_node(&file, "01-trousers").extras().as_ref().unwrap().get().to_string();
+    assert!(extras.contains(r#""free_percent":25"#), "{extras}");
+}
+
+#[test]
 fn what_was_written_is_read_back() {
     let avatar = dressed();
     let file = import(&write_glb(&avatar).unwrap());

@@ -23,7 +23,7 @@ use crate::{CaptureError, GarmentType, atomic_write, atomic_write::sync_parent};
 pub const BODY: &str = "body";
 
 /// What a take added, in the order of the takes.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
     /// Number of the take: 0 is the body.
     #[serde(skip)]
@@ -33,6 +33,9 @@ pub struct Layer {
     /// What garment it is; `None` for the body, or where nobody said and the name does not tell.
     #[serde(rename = "type", default, skip_serializing_if = "Option::is_none")]
     pub garment: Option<GarmentType>,
+    /// How thick the garment's cloth is, millimetres; `None` where nobody said: then its type tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thickness_mm: Option<f32>,
     /// Free text.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub notes: String,
@@ -46,7 +49,7 @@ impl Layer {
 }
 
 /// What `subject.toml` says.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct About {
     name: String,
     #[serde(default)]
@@ -60,7 +63,7 @@ struct About {
 }
 
 /// A take that is being recorded; [`Subject::accept`] makes it part of the subject.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PendingTake {
     /// The layer it will be.
     pub layer: Layer,
@@ -70,7 +73,7 @@ pub struct PendingTake {
 }
 
 /// A subject's folder.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Subject {
     folder: PathBuf,
     about: About,
@@ -216,7 +219,7 @@ impl Subject {
             return Err(CaptureError::format(&self.folder, reason));
         }
         let garment = garment.or_else(|| GarmentType::from_layer_name(name)).filter(|_| number > 0);
-        let layer = Layer { number, name: name.to_string(), garment, notes: String::new() };
+        let layer = Layer { number, name: name.to_string(), garment, thickness_mm: None, notes: String::new() };
         let path = self.take_path(&layer);
         Ok(PendingTake { layer, path, retake: false })
     }
@@ -315,7 +318,13 @@ impl Subject {
             };
             if check_name(name).is_ok() {
                 let garment = GarmentType::from_layer_name(name).filter(|_| number > 0);
-                self.about.layers.push(Layer { number, name: name.to_string(), garment, notes: String::new() });
+                self.about.layers.push(Layer {
+                    number,
+                    name: name.to_string(),
+                    garment,
+                    thickness_mm: None,
+                    notes: String::new(),
+                });
             }
         }
         if self.about.layers.len() > before { self.save() } else { Ok(()) }

@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let clock = Instant::now();
     if stacks {
-        let report = stack(&body0, &mut garments, &StackSettings::default(), &|_| ())?;
+        let report = stack(&body0, &mut garments, &vec![0.001; layers.len() - 1], &StackSettings::default(), &|_| ())?;
         println!("stacked in {:.2} s", clock.elapsed().as_secs_f32());
         report.layers.iter().for_each(|l| println!("  {l:?}"));
     }

@@ -115,21 +115,22 @@ impl Contacts {
             let (upper, lower) = (pair.upper, pair.lower);
             let probe = |v: usize| probe_vertex(surfaces, [upper, lower], v, settings);
             look(&mut pair.vertices, probe, &mut found);
-            let probe = |u: usize| probe_lower_vertex(surfaces, [upper, lower], u, settings);
+            let probe = |u: usize| probe_lower_vertex(surfaces, [upper, lower], u);
             look(&mut pair.lower_vertices, probe, &mut found);
         }
         found
     }
 
-    /// Contacts wherever an edge of a layer passes through a triangle of another; the upper has to move by `distance`
-    /// along the lower one's normal.
-    pub fn crossings(&self, surfaces: &[WornSurface], distance: f32) -> Vec<Contact> {
-        self.pairs.iter().flat_map(|pair| pair.crossings(surfaces, distance)).collect()
+    /// Contacts wherever an edge of a layer passes through a triangle of another; the upper has to move by so many
+    /// `gaps` along the lower one's normal.
+    pub fn crossings(&self, surfaces: &[WornSurface], gaps: f32) -> Vec<Contact> {
+        self.pairs.iter().flat_map(|pair| pair.crossings(surfaces, gaps)).collect()
     }
 }
 
 impl Pair {
-    fn crossings(&self, surfaces: &[WornSurface], distance: f32) -> Vec<Contact> {
+    fn crossings(&self, surfaces: &[WornSurface], gaps: f32) -> Vec<Contact> {
+        let distance = gaps * surfaces[self.upper].gap;
         crossing_contacts(surfaces, [self.upper, self.lower], &self.near(surfaces), distance)
     }
 
@@ -205,31 +206,20 @@ fn probe_vertex(
     settings: &StackSettings,
 ) -> (f32, Option<Contact>) {
     let on_upper = Anchor { surface: upper, corners: [v as u32; 3], weights: [1.0, 0.0, 0.0] };
-    probe(surfaces, on_upper, surfaces[upper].mesh.positions[v], lower, settings.reach, settings.gap)
+    probe(surfaces, on_upper, surfaces[upper].mesh.positions[v], lower, settings.reach)
 }
 
 /// The same for the upper layer's point nearest to a lower vertex.
-fn probe_lower_vertex(
-    surfaces: &[WornSurface],
-    [upper, lower]: [usize; 2],
-    u: usize,
-    settings: &StackSettings,
-) -> (f32, Option<Contact>) {
-    let (over, gap) = (&surfaces[upper], settings.gap);
+fn probe_lower_vertex(surfaces: &[WornSurface], [upper, lower]: [usize; 2], u: usize) -> (f32, Option<Contact>) {
+    let (over, gap) = (&surfaces[upper], surfaces[upper].gap);
     let Some(hit) = over.bvh.closest(&surfaces[lower].mesh.positions[u], NEAR) else { return (NEAR - gap, None) };
     let corners = over.mesh.triangles[hit.triangle as usize];
     let on_upper = Anchor { surface: upper, corners, weights: hit.barycentric };
-    probe(surfaces, on_upper, hit.point, lower, NEAR, gap)
+    probe(surfaces, on_upper, hit.point, lower, NEAR)
 }
 
-fn probe(
-    surfaces: &[WornSurface],
-    upper: Anchor,
-    p: Point3<f32>,
-    lower: usize,
-    reach: f32,
-    gap: f32,
-) -> (f32, Option<Contact>) {
+fn probe(surfaces: &[WornSurface], upper: Anchor, p: Point3<f32>, lower: usize, reach: f32) -> (f32, Option<Contact>) {
+    let gap = surfaces[upper.surface].gap;
     let h = match surfaces[lower].place(&p, reach) {
         Place::Far => return (reach - gap, None),
         // Both the point and the rim may come nearer.

@@ -8,7 +8,7 @@ use toile_geometry::{
     intersection::{crossings, self_crossings},
 };
 
-use crate::{StackSettings, contacts::Contact, worn_surface::WornSurface};
+use crate::{contacts::Contact, worn_surface::WornSurface};
 
 /// More than this share of a layer's triangles is not cut: such a layer cannot be parted.
 const MOST: f32 = 0.005;
@@ -17,13 +17,7 @@ const TOO_NEAR: f32 = 0.5;
 
 /// Cuts the triangles of surface `upper` that cross a surface below, those whose contact among `left` lacks too much, and
 /// of each pair that crosses within the layer but is not among `own_before` one. Returns how many triangles were cut.
-pub fn cut_rest(
-    surfaces: &mut [WornSurface],
-    upper: usize,
-    own_before: &[[u32; 2]],
-    left: &[Contact],
-    settings: &StackSettings,
-) -> usize {
+pub fn cut_rest(surfaces: &mut [WornSurface], upper: usize, own_before: &[[u32; 2]], left: &[Contact]) -> usize {
     let mesh = &surfaces[upper].mesh;
     let mut cut: BTreeSet<u32> =
         surfaces[..upper].iter().flat_map(|l| crossings(mesh, &l.mesh, &l.bvh)).map(|pair| pair[0]).collect();
@@ -32,7 +26,7 @@ pub fn cut_rest(
             cut.insert(pair[1]);
         }
     }
-    let lacks = |c: &&Contact| c.upper.surface == upper && c.by.norm() > TOO_NEAR * settings.gap;
+    let lacks = |c: &&Contact| c.upper.surface == upper && c.by.norm() > TOO_NEAR * surfaces[upper].gap;
     let near: BTreeSet<u32> = left.iter().filter(lacks).map(|c| c.upper.nearest_corner()).collect();
     let at_near = |t: &u32| mesh.triangles[*t as usize].iter().any(|v| near.contains(v));
     cut.extend((0..mesh.triangles.len() as u32).filter(at_near));
@@ -43,7 +37,7 @@ pub fn cut_rest(
     let kept = (0u32..).zip(&mesh.triangles).filter(|(t, _)| !cut.contains(t));
     rest.triangles = kept.map(|(_, &corners)| corners).collect();
     tidy(&mut rest, mesh, &cut);
-    surfaces[upper] = WornSurface::new(&rest);
+    surfaces[upper] = WornSurface::new(&rest, surfaces[upper].gap);
     cut.len()
 }
 
@@ -75,15 +69,15 @@ mod tests {
                 .flat_map(|j| (0..n - 1).map(move |i| j * n + i))
                 .flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]])
                 .collect();
-            WornSurface::new(&Mesh::new((0..n * n).map(at).collect(), triangles))
+            WornSurface::new(&Mesh::new((0..n * n).map(at).collect(), triangles), 0.0015)
         };
         let spike = |i: u32, j: u32| if (i, j) == (15, 15) { -0.005 } else { 0.003 };
         let mut surfaces = [sheet(&|_, _| 0.0), sheet(&spike)];
-        assert_eq!(cut_rest(&mut surfaces, 1, &[], &[], &StackSettings::default()), 6);
+        assert_eq!(cut_rest(&mut surfaces, 1, &[], &[]), 6);
         assert_eq!(surfaces[1].mesh.positions.len() as u32, n * n);
         assert!(surfaces[1].mesh.positions.iter().all(|p| p.z == 0.003), "nothing strays");
-        assert_eq!(cut_rest(&mut surfaces, 1, &[], &[], &StackSettings::default()), 0);
+        assert_eq!(cut_rest(&mut surfaces, 1, &[], &[]), 0);
         let mut through = [sheet(&|_, _| 0.0), sheet(&|i, _| i as f32 * 0.001 - 0.0152)];
-        assert_eq!(cut_rest(&mut through, 1, &[], &[], &StackSettings::default()), 0);
+        assert_eq!(cut_rest(&mut through, 1, &[], &[]), 0);
     }
 }

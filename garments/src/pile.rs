@@ -41,9 +41,9 @@ pub struct Pile {
 }
 
 impl Pile {
-    /// Meshes inside to outside, and which of their vertices stay.
-    pub fn new(meshes: &[Mesh], held: Vec<Vec<bool>>) -> Self {
-        let surfaces: Vec<WornSurface> = meshes.par_iter().map(WornSurface::new).collect();
+    /// Meshes inside to outside with the gap of each, and which of their vertices stay.
+    pub fn new(meshes: &[(Mesh, f32)], held: Vec<Vec<bool>>) -> Self {
+        let surfaces: Vec<WornSurface> = meshes.par_iter().map(|(mesh, gap)| WornSurface::new(mesh, *gap)).collect();
         let mut all = Mesh::default();
         let mut starts = Vec::new();
         for surface in &surfaces {
@@ -107,7 +107,7 @@ impl Pile {
         if fresh || found.len() < FEW || round % LOOK_AGAIN == LOOK_AGAIN - 1 {
             // Each crossing asks for a little more than the last one, until it gives way.
             let more = (1.0 + 0.25 * round as f32).min(MOST_CROSSING);
-            found.extend(contacts.crossings(&self.surfaces, settings.gap * more));
+            found.extend(contacts.crossings(&self.surfaces, more));
         }
         found.retain(|c| c.upper.corners.iter().any(|&v| !self.held[c.upper.surface][v as usize]));
         found

@@ -59,11 +59,12 @@ impl Region {
         let held = |(mesh, _): &(Mesh, Vec<u32>)| mesh.positions.iter().map(|p| !self.holds(p)).collect();
         let held = parts.iter().map(held).collect();
         let (meshes, origins): (Vec<Mesh>, Vec<Vec<u32>>) = parts.into_iter().unzip();
+        let meshes: Vec<(Mesh, f32)> = meshes.into_iter().zip(surfaces.iter().map(|s| s.gap)).collect();
         let mut pile = Pile::new(&meshes, held);
         let rounds = pile.part(settings);
         let mut moved = Vec::new();
         for (k, origins) in origins.iter().enumerate().skip(1) {
-            for ((new, old), &v) in pile.surfaces[k].mesh.positions.iter().zip(&meshes[k].positions).zip(origins) {
+            for ((new, old), &v) in pile.surfaces[k].mesh.positions.iter().zip(&meshes[k].0.positions).zip(origins) {
                 if new != old {
                     moved.push((k, v, *new));
                 }

@@ -64,7 +64,8 @@ impl Default for ExtractSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct StackSettings {
-    /// Least gap between any two layers, metres. Default 0.0015.
+    /// Gap of a thin layer over each layer below, metres; no layer's gap is less. Pushes stop at four fifths of a gap.
+    /// Default 0.0015.
     pub gap: f32,
     /// Distance over which a push spreads into its surroundings, metres. Default 0.015.
     pub spread: f32,
@@ -77,6 +78,14 @@ pub struct StackSettings {
 impl Default for StackSettings {
     fn default() -> Self {
         Self { gap: 0.0015, spread: 0.015, rounds: 80, reach: 0.05 }
+    }
+}
+
+impl StackSettings {
+    /// The gap of a layer of cloth `thickness` metres thick over what lies below. Meshes are the outer sides of cloth,
+    /// so its own thickness has to fit in between.
+    pub fn gap_of(&self, thickness: f32) -> f32 {
+        self.gap.max(thickness)
     }
 }
 

@@ -26,26 +26,34 @@ use crate::{
 const PASSES: usize = 6;
 
 /// Moves the `layers` (inside to outside, in the pose of `body`) so that each lies outside the body and all layers
-/// below it. The body stays.
+/// below it, by a gap that grows with its `thickness` (metres, one a layer; what a scan shows is the outer side of
+/// cloth): see [`StackSettings::gap_of`]. The body stays.
 ///
 /// # Errors
-/// [`GarmentError::Mesh`] where a mesh is broken. Layers that do not settle are told in the report.
+/// [`GarmentError::Mesh`] where a mesh is broken, [`GarmentError::Mismatch`] where there is not a thickness for each
+/// layer. Layers that do not settle are told in the report.
 pub fn stack(
     body: &Mesh,
     layers: &mut [Mesh],
+    thickness: &[f32],
     settings: &StackSettings,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<StackReport, GarmentError> {
     for mesh in std::iter::once(body).chain(layers.iter()) {
         mesh.validate().map_err(|e| GarmentError::Mesh(format!("a layer to stack: {e}")))?;
     }
-    let meshes: Vec<&Mesh> = std::iter::once(body).chain(layers.iter()).collect();
-    let mut surfaces: Vec<WornSurface> = meshes.into_par_iter().map(WornSurface::new).collect();
+    if thickness.len() != layers.len() {
+        let reason = format!("{} layers have {} thicknesses", layers.len(), thickness.len());
+        return Err(GarmentError::Mismatch(reason));
+    }
+    let gaps = thickness.iter().map(|t| settings.gap_of(*t));
+    let meshes: Vec<(&Mesh, f32)> = std::iter::once((body, 0.0)).chain(layers.iter().zip(gaps)).collect();
+    let mut surfaces: Vec<WornSurface> = meshes.into_par_iter().map(|(m, gap)| WornSurface::new(m, gap)).collect();
     let own_before = own_crossings(&surfaces);
     let (rounds, left) = settle(&mut surfaces, &own_before, settings, progress);
     let mut report = StackReport::default();
     for (k, layer) in layers.iter_mut().enumerate() {
-        let cut_triangles = cut_rest(&mut surfaces, k + 1, &own_before[k + 1], &left, settings);
+        let cut_triangles = cut_rest(&mut surfaces, k + 1, &own_before[k + 1], &left);
         let stacked = &surfaces[k + 1];
         layer.triangles.clone_from(&stacked.mesh.triangles);
         let start = std::mem::replace(&mut layer.positions, stacked.mesh.positions.clone());
@@ -56,6 +64,7 @@ pub fn stack(
             settled: crossing == 0 && left.iter().all(|c| c.upper.surface != k + 1),
             crossing_pairs: crossing,
             cut_triangles,
+            gap_m: stacked.gap,
             self_crossings: [own_before[k + 1].len(), self_crossings(&stacked.mesh, &stacked.bvh).len()],
             ..LayerReport::default()
         };
@@ -111,7 +120,7 @@ fn settle(
 
 fn too_near(contacts: &mut Contacts, surfaces: &[WornSurface], settings: &StackSettings) -> Vec<Contact> {
     let mut left = contacts.samples(surfaces, settings);
-    left.extend(contacts.crossings(surfaces, settings.gap));
+    left.extend(contacts.crossings(surfaces, 1.0));
     left
 }
 

@@ -22,6 +22,8 @@ pub struct LayerReport {
     pub cut_triangles: usize,
     /// Pairs of triangles of the layer itself that cross, before and after.
     pub self_crossings: [usize; 2],
+    /// The gap that was asked for, metres; four fifths of it are enough.
+    pub gap_m: f32,
     /// Least height of the layer's vertices over any lower layer, metres.
     pub least_gap_m: f32,
     /// Share of its vertices by their height over the nearest lower layer: bins end at [`GAP_BINS_MM`], the last is

@@ -22,6 +22,8 @@ pub struct WornSurface {
     pub normals: Vec<Vector3<f32>>,
     /// Its vertices' neighbours.
     pub neighbors: VertexNeighbors,
+    /// How far it has to stay over each layer below, metres.
+    pub gap: f32,
     /// True for vertices of open sides.
     pub open_vertices: Vec<bool>,
     open_sides: Vec<[bool; 3]>,
@@ -50,8 +52,8 @@ pub enum Place {
 }
 
 impl WornSurface {
-    /// Reads a mesh.
-    pub fn new(mesh: &Mesh) -> Self {
+    /// Reads a mesh that has to stay `gap` metres over what lies below.
+    pub fn new(mesh: &Mesh, gap: f32) -> Self {
         let mesh = Mesh::new(mesh.positions.clone(), mesh.triangles.clone());
         let edges = Edges::new(&mesh.triangles);
         let open = |e: u32| edges.uses[e as usize] == 1;
@@ -65,13 +67,14 @@ impl WornSurface {
             neighbors: VertexNeighbors::new(mesh.positions.len(), &mesh.triangles),
             open_sides: edges.of_triangle.iter().map(|s| s.map(open)).collect(),
             open_vertices,
+            gap,
             mesh,
         }
     }
 
     /// Takes note that the mesh's positions have changed.
     pub fn refresh(&mut self) {
-        self.bvh = Bvh::new(&self.mesh.positions, &self.mesh.triangles);
+        self.bvh.refit(&self.mesh.positions, &self.mesh.triangles);
         self.normals = self.mesh.vertex_normals();
     }
 

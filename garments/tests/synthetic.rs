@@ -254,7 +254,7 @@ fn crossing_layers() -> (Mesh, Vec<Mesh>) {
 fn stacked_layers_have_their_gap_and_cross_nowhere() {
     let (body, mut layers) = crossing_layers();
     let before = layers.clone();
-    let report = stack(&body, &mut layers, &StackSettings::default(), &|_| ()).unwrap();
+    let report = stack(&body, &mut layers, &[0.001; 2], &StackSettings::default(), &|_| ()).unwrap();
     for (k, layer) in report.layers.iter().enumerate() {
         assert!(layer.settled && layer.crossing_pairs == 0, "layer {k}: {layer:?}");
         assert!(layer.least_gap_m >= 0.001, "layer {k}: {layer:?}");
@@ -276,11 +276,33 @@ fn stacked_layers_have_their_gap_and_cross_nowhere() {
 }
 
 #[test]
+fn thicker_cloth_lies_higher_and_still_crosses_nowhere() {
+    let mut gaps = Vec::new();
+    for thickness in [0.0, 0.003, 0.005] {
+        let (body, mut layers) = crossing_layers();
+        let report = stack(&body, &mut layers, &[0.0, thickness], &StackSettings::default(), &|_| ()).unwrap();
+        let [shirt, coat] = &report.layers[..] else { panic!("{report:?}") };
+        assert!(shirt.settled && coat.settled && coat.crossing_pairs == 0, "{thickness}: {report:?}");
+        assert_eq!((shirt.gap_m, coat.gap_m), (0.0015, thickness.max(0.0015)));
+        assert!(shirt.least_gap_m >= 0.0012 && coat.least_gap_m >= 0.8 * coat.gap_m, "{thickness}: {coat:?}");
+        gaps.push(coat.least_gap_m);
+    }
+    assert!(gaps[0] < 0.003 && gaps.windows(2).all(|pair| pair[1] > pair[0]), "{gaps:?}");
+}
+
+#[test]
+fn every_layer_needs_a_thickness() {
+    let (body, mut layers) = crossing_layers();
+    let refused = stack(&body, &mut layers, &[0.001], &StackSettings::default(), &|_| ());
+    assert!(matches!(refused, Err(GarmentError::Mismatch(_))), "{refused:?}");
+}
+
+#[test]
 fn layers_that_are_apart_stay_to_the_bit() {
     let body = crossing_layers().0;
     let far = column(|_, _| RADIUS + 0.03, |_| BLUE);
     let mut layers = vec![far.clone()];
-    stack(&body, &mut layers, &StackSettings::default(), &|_| ()).unwrap();
+    stack(&body, &mut layers, &[0.001], &StackSettings::default(), &|_| ()).unwrap();
     assert_eq!(layers[0].positions, far.positions);
 }
 
@@ -292,7 +314,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
             let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
             let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
             let (body, mut layers) = crossing_layers();
-            stack(&body, &mut layers, &StackSettings::default(), &|_| ()).unwrap();
+            stack(&body, &mut layers, &[0.001; 2], &StackSettings::default(), &|_| ()).unwrap();
             (found.garment, found.weights, layers)
         })
     };

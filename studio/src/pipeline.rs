@@ -9,6 +9,7 @@ pub mod deliverables;
 pub mod fit;
 pub mod folders;
 pub mod fuse;
+pub mod garment;
 pub mod motion;
 pub mod opened;
 pub mod page;

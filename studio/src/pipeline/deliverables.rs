@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use serde::Serialize;
 use serde_json::{Value, json};
 use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, write_glb, write_vrm};
 use toile_character::{Pose, Skeleton, SkinWeights};
@@ -13,12 +14,18 @@ use toile_geometry::Mesh;
 
 use crate::{
     StudioError,
-    pipeline::{Run, body_file::Body, motion, skin_attributes::take_weights},
+    pipeline::{
+        Run,
+        body_file::Body,
+        garment::{garment_type, thickness},
+        motion,
+        skin_attributes::take_weights,
+    },
     stage::{Product, Record, Stage, plain},
 };
 
 /// Raised whenever the same inputs and settings give other files.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Expected seconds.
 pub const COST: f64 = 0.5;
 
@@ -32,9 +39,9 @@ pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, cull: Option<&CullSetting
     let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
     inputs.extend(run.garments().map(|l| folders.garment(l)));
     inputs.extend(bvh.map(Path::to_path_buf));
-    let types: Vec<Option<String>> = (0..run.layers.len()).map(|n| garment_type(run, n)).collect();
+    let garments: Vec<Garment> = run.garment_numbers().map(|n| Garment::new(run, n)).collect::<Result<_, _>>()?;
     let mut settings =
-        json!({ "name": run.title(), "types": types, "retarget": motion::settings(), "vrm": VrmMeta::default() });
+        json!({ "name": run.title(), "garments": garments, "retarget": motion::settings(), "vrm": VrmMeta::default() });
     if let Some(cull) = cull {
         settings["cull"] = plain(cull)?;
     }
@@ -51,7 +58,7 @@ pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, cull: Option<&CullSetting
     };
     stage.run(&run.label("avatar", "export"), run.progress, |progress| {
         let moved = motion::load(bvh, &body.skinned.skeleton)?;
-        let mut avatar = dressed(run, body, &types)?;
+        let mut avatar = dressed(run, body, garments)?;
         let mut result = json!({ "motion": moved.report });
         if let Some(cull) = cull {
             result["left_out"] =
@@ -95,19 +102,36 @@ pub fn rigged_scan(
     write_glb(&avatar).map_err(|e| StudioError::stage(Path::new("rigged_scan.glb"), e))
 }
 
+/// What is told of a garment in the files.
+#[derive(Debug, Serialize)]
+struct Garment {
+    number: usize,
+    garment_type: Option<String>,
+    /// Metres.
+    thickness: f32,
+}
+
+impl Garment {
+    fn new(run: &Run, number: usize) -> Result<Self, StudioError> {
+        let garment_type = garment_type(run, number).map(|t| t.to_string());
+        Ok(Self { number, garment_type, thickness: thickness(run, number)? })
+    }
+}
+
 /// The avatar at rest in scan 0's pose: the body and every garment.
-fn dressed(run: &Run, body: &Body, types: &[Option<String>]) -> Result<Avatar, StudioError> {
+fn dressed(run: &Run, body: &Body, garments: Vec<Garment>) -> Result<Avatar, StudioError> {
     let folders = &run.folders;
     let mesh = run.read_mesh(&folders.body_mesh())?;
     let weights = body.skinned.weights.clone();
     let mut layers = vec![AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None }];
-    for (n, layer) in run.layers.iter().enumerate().filter(|(_, l)| run.garments().any(|g| g == l.as_str())) {
+    for Garment { number, garment_type, thickness } in garments {
+        let layer = &run.layers[number];
         let path = folders.garment(layer);
         let mut mesh = run.read_mesh(&path)?;
         let weights = take_weights(&mut mesh)
             .ok_or_else(|| StudioError::format(&path, "has no skin weights; delete it and run again"))?;
-        let garment = types[n].clone();
-        layers.push(AvatarLayer { name: layer.clone(), mesh, weights, order: n as u32, garment, thickness: None });
+        let (order, garment, thickness) = (number as u32, garment_type, Some(thickness));
+        layers.push(AvatarLayer { name: layer.clone(), mesh, weights, order, garment, thickness });
     }
     let (skeleton, pose0) = (body.skinned.skeleton.clone(), body.pose0.clone());
     Ok(Avatar { name: run.title().to_string(), skeleton, pose0, layers, motions: Vec::new() })
@@ -127,16 +151,6 @@ fn leave_out_hidden(avatar: &mut Avatar, settings: &CullSettings) -> Result<Valu
     }
     avatar.layers.retain(|l| !l.mesh.is_empty());
     Ok(told)
-}
-
-/// The told type of take `n`'s garment, else the one that the stage `cut` guessed.
-fn garment_type(run: &Run, n: usize) -> Option<String> {
-    let told = run.garment_type(n).map(|t| t.to_string());
-    told.or_else(|| {
-        let report: serde_json::Value =
-            crate::pipeline::body_file::read_json(&run.folders.layer(&run.layers[n]).join("report.json")).ok()?;
-        Some(report["stages"]["cut"]["result"]["garment_type"].as_str()?.to_string())
-    })
 }
 
 #[cfg(test)]

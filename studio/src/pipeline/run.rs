@@ -90,6 +90,11 @@ impl<'a> Run<'a> {
         self.layers.iter().skip(1).filter(|l| !self.left_out.contains(l)).map(String::as_str)
     }
 
+    /// Their takes' numbers.
+    pub fn garment_numbers(&self) -> impl Iterator<Item = usize> {
+        (1..self.layers.len()).filter(|&n| !self.left_out.contains(&self.layers[n]))
+    }
+
     /// Leaves a layer in which nothing new was found out of the avatar, with what an earlier run made of it.
     ///
     /// # Errors
@@ -120,6 +125,11 @@ impl<'a> Run<'a> {
     pub fn garment_type(&self, n: usize) -> Option<GarmentType> {
         let layer = self.subject.as_ref()?.layers().get(n)?;
         layer.garment?.name().parse().ok()
+    }
+
+    /// Thickness of the cloth of the garment that take `n` added, millimetres, where it is told.
+    pub fn thickness_mm(&self, n: usize) -> Option<f32> {
+        self.subject.as_ref()?.layers().get(n)?.thickness_mm
     }
 
     /// The recording of a take.

@@ -5,7 +5,9 @@
 
 use serde_json::json;
 use toile_character::{Pose, SkinWeights};
-use toile_garments::{LayerReport, PosedReport, StackSettings, Worn, carry_weights, posed_report, stack};
+use toile_garments::{
+    LayerReport, PosedReport, StackSettings, Worn, carry_weights, hanging::FREE_PART, posed_report, stack,
+};
 use toile_geometry::{Mesh, ply};
 
 use crate::{
@@ -13,6 +15,7 @@ use crate::{
     pipeline::{
         Run,
         body_file::Body,
+        garment::thickness,
         motion,
         skin_attributes::{take_weights, with_weights},
     },
@@ -20,7 +23,7 @@ use crate::{
 };
 
 /// Raised whenever the same inputs and settings give other garments.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 /// Expected seconds for each garment.
 pub const COST: f64 = 1.5;
 /// Poses of the shipped walk in which crossings are counted.
@@ -33,6 +36,7 @@ const POSES: usize = 4;
 pub fn run(run: &Run, body: &Body) -> Result<Record, StudioError> {
     let folders = &run.folders;
     let garments: Vec<&str> = run.garments().collect();
+    let thickness: Vec<f32> = run.garment_numbers().map(|n| thickness(run, n)).collect::<Result<_, _>>()?;
     let settings = StackSettings::default();
     let of_body = [folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
     let inputs = of_body.into_iter().chain(garments.iter().map(|l| folders.unstacked(l))).collect();
@@ -43,7 +47,7 @@ pub fn run(run: &Run, body: &Body) -> Result<Record, StudioError> {
         root: &folders.root,
         folder: folders.layers(),
         inputs,
-        settings: plain(&settings)?,
+        settings: json!({ "stack": plain(&settings)?, "thickness_m": thickness }),
         outputs: garments.iter().map(|l| folders.garment(l)).collect(),
         outputs_vary: false,
     };
@@ -52,13 +56,14 @@ pub fn run(run: &Run, body: &Body) -> Result<Record, StudioError> {
         let (mut layers, mut weights): (Vec<Mesh>, Vec<SkinWeights>) =
             garments.iter().map(|l| garment(run, l)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let wrong = |e| StudioError::stage(&folders.root, e);
-        let report = stack(&body_mesh, &mut layers, &settings, progress).map_err(wrong)?;
-        carry_weights(&layers, &mut weights).map_err(wrong)?;
+        let report = stack(&body_mesh, &mut layers, &thickness, &settings, progress).map_err(wrong)?;
+        carry_weights(&layers, &mut weights, &body.skinned.skeleton, &body.pose0).map_err(wrong)?;
         let walking = walking(body, &body_mesh, &layers, &weights)?;
         let encoded = layers.iter().zip(&weights).map(|(mesh, w)| ply::encode(&with_weights(mesh, w)));
         let files = garments.iter().map(|l| folders.garment(l)).zip(encoded).collect();
         let warnings = garments.iter().zip(&report.layers).filter_map(|(l, r)| warning(l, r)).collect();
-        let result = json!({ "layers": plain(&report.layers)?, "walking": plain(&walking)? });
+        let free: Vec<Option<f32>> = layers.iter().map(free_share).collect();
+        let result = json!({ "layers": plain(&report.layers)?, "walking": plain(&walking)?, "free_share": free });
         Ok(Product { files, result, warnings, ..Product::default() })
     })
 }
@@ -69,6 +74,12 @@ fn garment(run: &Run, layer: &str) -> Result<(Mesh, SkinWeights), StudioError> {
     let weights =
         take_weights(&mut mesh).ok_or_else(|| StudioError::format(&path, "has no skin weights; delete it"))?;
     Ok((mesh, weights))
+}
+
+/// Share of a skirt's or dress's vertices that hang free of the body.
+fn free_share(mesh: &Mesh) -> Option<f32> {
+    let free = mesh.attributes.get(FREE_PART)?;
+    Some(free.iter().sum::<f32>() / free.len().max(1) as f32)
 }
 
 /// What the layers do in the shipped walk by their weights alone.

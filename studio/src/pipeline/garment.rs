@@ -1,0 +1,36 @@
+//! What is known of a garment: its type and how thick its cloth is.
+
+use toile_garments::GarmentType;
+
+use crate::{
+    StudioError,
+    pipeline::{Run, body_file::read_json},
+};
+
+/// No cloth is thicker, millimetres: stacking does not look further.
+const THICKEST_MM: f32 = 10.0;
+
+/// The told type of take `n`'s garment, else the one that the stage `cut` guessed.
+pub fn garment_type(run: &Run, n: usize) -> Option<GarmentType> {
+    run.garment_type(n).or_else(|| {
+        let report: serde_json::Value = read_json(&run.folders.layer(&run.layers[n]).join("report.json")).ok()?;
+        report["stages"]["cut"]["result"]["garment_type"].as_str()?.parse().ok()
+    })
+}
+
+/// Thickness of the cloth of take `n`'s garment, metres: what `subject.toml` says (`thickness_mm`), else what is common
+/// for its type.
+///
+/// # Errors
+/// [`StudioError`] where `subject.toml` tells no thickness of cloth.
+pub fn thickness(run: &Run, n: usize) -> Result<f32, StudioError> {
+    match run.thickness_mm(n) {
+        Some(mm) if (0.0..=THICKEST_MM).contains(&mm) => Ok(mm * 1e-3),
+        Some(mm) => {
+            let layer = &run.layers[n];
+            let reason = format!("{layer}: thickness_mm = {mm} is not between 0 and {THICKEST_MM}");
+            Err(StudioError::format(&run.folders.root.join("subject.toml"), reason))
+        }
+        None => Ok(garment_type(run, n).unwrap_or(GarmentType::Other).thickness()),
+    }
+}
