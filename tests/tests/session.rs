@@ -142,6 +142,40 @@ fn a_second_run_does_nothing() {
 }
 
 #[test]
+fn hidden_skin_is_left_out_on_request_and_comes_back() {
+    let Some(made) = demo() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let subject = dir.path().join(made.file_name().unwrap());
+    for (name, bytes) in files(made) {
+        let path = subject.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+    let export = |more: &[&str]| {
+        let output = toile(&[&["export", subject.to_str().unwrap()], more].concat()).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let read = |name: &str| fs::read(subject.join(name)).unwrap();
+    let whole = ["avatar.glb", "avatar.vrm"].map(read);
+    let corners = || {
+        let gltf = glb_json(&subject.join("avatar.glb"));
+        let indices = |mesh: &Value| mesh["primitives"][0]["indices"].as_u64().unwrap() as usize;
+        let count = |mesh| gltf["accessors"][indices(mesh)]["count"].as_u64().unwrap();
+        gltf["meshes"].as_array().unwrap().iter().map(count).collect::<Vec<u64>>()
+    };
+    let all = corners();
+    let told = export(&["--cull-hidden"]);
+    let culled = corners();
+    assert!(told.contains("body: ") && told.contains("triangles left out"), "{told}");
+    assert!(0 < culled[0] && culled[0] < all[0], "{culled:?} of {all:?}");
+    assert_eq!(culled.last(), all.last(), "the outermost layer is whole");
+    assert!(["avatar.glb", "avatar.vrm"].iter().zip(&whole).all(|(name, whole)| read(name).len() < whole.len()));
+    export(&[]);
+    assert!(["avatar.glb", "avatar.vrm"].map(read) == whole, "whole again");
+}
+
+#[test]
 fn khronos_validator_finds_nothing() {
     let Some(subject) = demo() else { return };
     let modules = workspace().join("target/outside/node_modules");
