@@ -74,6 +74,11 @@ const LOOSE_MM: f64 = 3.0;
 /// Distance within which the body explains the scan, metres: skin, and under clothes.
 const EXPLAINED: f32 = 0.02;
 const EXPLAINED_DRESSED: f32 = 0.10;
+/// Least part of the scan that a fit in its place explains, per cent: an arm laid wrongly leaves 0.7 % over, noise 0.4 % at most.
+const EXPLAINS: f64 = 99.5;
+const EXPLAINS_DRESSED: f64 = 97.0;
+/// Root mean square of β from which a shape is too unusual to be believed: people outside the model's span reach 1.9.
+const UNUSUAL: f64 = 2.0;
 /// Distance within which the scan covers the body, metres: skin, and under clothes.
 const COVERED: f32 = 0.015;
 const COVERED_DRESSED: f32 = 0.10;
@@ -128,11 +133,12 @@ impl FitReport {
             }
         };
         let (explained, covered) = (100.0 * self.scan_explained, 100.0 * self.body_covered);
+        let enough = if self.estimated { EXPLAINS_DRESSED } else { EXPLAINS };
         find(
-            explained < 97.0,
+            explained < enough,
             explained < 80.0,
             format!(
-                "the body explains {explained:.0} % of the scan: is there one standing person in it, alone and lightly dressed?"
+                "the body explains {explained:.1} % of the scan: is there one standing person in it, alone and lightly dressed?"
             ),
         );
         find(
@@ -142,9 +148,9 @@ impl FitReport {
         );
         let hidden: Vec<&str> = self.region_covered.iter().filter(|r| *r.1 < HARDLY_SEEN).map(|r| *r.0).collect();
         let (small, large): (Vec<&str>, Vec<&str>) =
-            hidden.into_iter().partition(|r| r.ends_with("hand") || r.ends_with("foot"));
+            hidden.into_iter().partition(|r| r.ends_with("hand") || r.ends_with("foot") || *r == "head");
         if !small.is_empty() {
-            // a hand or foot alone hardly moves the rest of the body
+            // a hand, a foot or the head alone hardly moves the rest of the body
             self.notices.push(format!("hardly seen and therefore estimated: {}", small.join(", ")));
         }
         find(
@@ -163,7 +169,7 @@ impl FitReport {
         let human = (1.2..=2.2).contains(&stature);
         find(!human, !(0.6..=2.5).contains(&stature), format!("the body would stand {stature:.2} m tall"));
         let rms = self.shape_rms;
-        find(rms > 1.8, rms > 3.0, format!("the shape is {rms:.1} times as unusual as an ordinary body's"));
+        find(rms > UNUSUAL, rms > 3.0, format!("the shape is {rms:.1} times as unusual as an ordinary body's"));
         // each doubt alone may have a reason; many together have one: the fit is wrong
         let many = if self.estimated { 4 } else { 3 };
         self.verdict = if self.reasons.len() >= many { Verdict::Failed } else { worst };
