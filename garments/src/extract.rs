@@ -19,7 +19,7 @@ use crate::{
     hanging::{FREE_PART, mark_free},
     hem,
     labels::{self, Labels},
-    rim,
+    not_new, rim,
     scan_graph::ScanGraph,
     untangle,
 };
@@ -152,7 +152,7 @@ pub fn extract(
     let graph = ScanGraph::new(take.scan);
     let evidence = evidence::measure(take, &graph, settings);
     progress(0.3);
-    let (garment_type, mut labels) = label(take, &graph, &evidence, settings);
+    let (garment_type, mut labels, uncovered) = label(take, &graph, &evidence, settings);
     clean::drop_islands(&graph, &mut labels, settings);
     clean::settle_filled(take.scan, &graph, &evidence, &mut labels, &bones(take));
     take_off_steps(take, &graph, &evidence, &mut labels, garment_type, settings);
@@ -167,7 +167,7 @@ pub fn extract(
     progress(0.8);
     let weights = common_frame::weights(take, &in_take, settings);
     let garment = common_frame::to_common_frame(take, &in_take, &weights);
-    let mut warnings = warnings(&graph, &evidence, &labels, &in_take);
+    let mut warnings = warnings(&graph, &evidence, &labels, &in_take, uncovered);
     if looks_like_two(take, &graph, &evidence, &labels) {
         warnings.push(Warning::TwoAtOnce);
     }
@@ -191,17 +191,28 @@ fn check(take: &Take) -> Result<(), GarmentError> {
     take.edits.map_or(Ok(()), |edits| edits.check().and_then(|()| edits.check_on(take.scan)))
 }
 
-/// Labels with the told type's template, or first with none, then with that of the guessed type.
-fn label(take: &Take, graph: &ScanGraph, evidence: &Evidence, settings: &ExtractSettings) -> (GarmentType, Labels) {
+/// Labels with the told type's template, or first with none, then with that of the guessed type; and the area of what
+/// looked new and was uncovered.
+fn label(
+    take: &Take,
+    graph: &ScanGraph,
+    evidence: &Evidence,
+    settings: &ExtractSettings,
+) -> (GarmentType, Labels, f32) {
+    let labelled = |garment_type: GarmentType, earlier: Option<&Labels>| {
+        let mut labels = labels::label(graph, evidence, garment_type, earlier, settings);
+        let uncovered = not_new::drop_uncovered(graph, evidence, &mut labels);
+        not_new::drop_swung(graph, evidence, &mut labels);
+        (garment_type, labels, uncovered)
+    };
     if let Some(told) = take.garment_type {
-        return (told, labels::label(graph, evidence, told, None, settings));
+        return labelled(told, None);
     }
-    let free = labels::label(graph, evidence, GarmentType::Other, None, settings);
-    let guess = guess_type(take, graph, evidence, &free);
-    if guess == GarmentType::Other {
-        return (guess, free);
+    let free = labelled(GarmentType::Other, None);
+    match guess_type(take, graph, evidence, &free.1) {
+        GarmentType::Other => free,
+        guess => labelled(guess, Some(&free.1)),
     }
-    (guess, labels::label(graph, evidence, guess, Some(&free), settings))
 }
 
 /// Moves the border from the foot of each hem's step half-way up.
@@ -380,12 +391,12 @@ fn bones(take: &Take) -> Vec<[Point3<f32>; 2]> {
     JOINTS.iter().filter_map(|j| Some([at[j.parent()?.index()].cast::<f32>(), at[j.index()].cast::<f32>()])).collect()
 }
 
-fn warnings(graph: &ScanGraph, evidence: &Evidence, labels: &Labels, garment: &Mesh) -> Vec<Warning> {
+fn warnings(graph: &ScanGraph, evidence: &Evidence, labels: &Labels, garment: &Mesh, uncovered: f32) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if garment.is_empty() {
         warnings.push(Warning::NothingNew);
     }
-    let area = sunken_area(graph, evidence, labels);
+    let area = uncovered.max(sunken_area(graph, evidence, labels));
     if area > SUNKEN_AREA {
         warnings.push(Warning::TakenOff(area));
     }

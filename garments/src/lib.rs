@@ -5,6 +5,7 @@
 //! 1. [`evidence`]: how far each scan vertex stands off what was worn before, how its colour differs, and where on
 //!    the body it lies;
 //! 2. [`labels`]: new garment or not, one energy over the scan's surface, minimised globally by a graph cut;
+//!    What only swung, or was uncovered, is not ([`not_new`]);
 //! 3. [`hem`], [`cut`], [`clean`] and [`rim`]: the garment's own mesh, cut through triangles along a smooth hem, islands dropped, holes
 //!    closed;
 //! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
@@ -42,6 +43,7 @@ pub mod hidden;
 pub mod labels;
 pub mod layer_weights;
 pub mod limit_stretch;
+pub mod not_new;
 pub mod pile;
 pub mod posed;
 pub mod push;

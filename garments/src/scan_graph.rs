@@ -1,6 +1,6 @@
 //! A scan's surface as a graph: areas, colours and the length of hem that each edge stands for.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use toile_geometry::{
     Mesh,
     mesh::vertex_normals,
@@ -12,6 +12,8 @@ use crate::color;
 /// What labelling needs to know of a scan's surface.
 #[derive(Debug, Clone)]
 pub struct ScanGraph {
+    /// Positions, metres.
+    pub positions: Vec<Point3<f32>>,
     /// Area that each vertex stands for, square metres.
     pub areas: Vec<f32>,
     /// Unit normals.
@@ -46,6 +48,7 @@ impl ScanGraph {
             }
         }
         Self {
+            positions: scan.positions.clone(),
             areas,
             normals: vertex_normals(&scan.positions, &scan.triangles),
             lab: scan.colors.iter().map(|&c| color::lab(c)).collect(),
@@ -64,6 +67,11 @@ impl ScanGraph {
     /// True for a scan without vertices.
     pub fn is_empty(&self) -> bool {
         self.areas.is_empty()
+    }
+
+    /// Length of the way from a vertex to its neighbour, metres.
+    pub fn step(&self, from: usize, to: usize) -> f32 {
+        (self.positions[to] - self.positions[from]).norm()
     }
 
     /// Total area, square metres.

@@ -44,14 +44,6 @@ pub enum StudioError {
         /// What is wrong and what to do.
         reason: String,
     },
-    /// A garment take that shows nothing new.
-    #[error("{path}: {reason}; the avatar goes without it; record it again and import it with --retake")]
-    NothingNew {
-        /// The take.
-        path: PathBuf,
-        /// What was found.
-        reason: String,
-    },
     /// A device or the permission to use it.
     #[error("{0}")]
     Device(String),
@@ -100,7 +92,6 @@ impl StudioError {
             Self::DiskFull { .. } => "disk-full",
             Self::Format { .. } => "format",
             Self::Stage { .. } => "stage",
-            Self::NothingNew { .. } => "nothing-new",
             Self::Device(_) => "device",
             Self::Busy { .. } => "busy",
             Self::Capture(_) => "capture",

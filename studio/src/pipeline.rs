@@ -120,14 +120,11 @@ fn dress(
     for n in 1..run.layers.len() {
         let layer = run.layers[n].clone();
         summary.add(&layer, "pose", pose::run(run, n, &body, model)?);
-        match cut::run(run, n, &body) {
-            Ok(record) => summary.add(&layer, "cut", record),
-            Err(error @ StudioError::NothingNew { .. }) => {
-                run.leave_out(&layer)?;
-                summary.failures.push(error.to_string());
-            }
-            Err(error) => return Err(error),
+        let cut = cut::run(run, n, &body)?;
+        if !cut.failures.is_empty() {
+            run.leave_out(&layer)?;
         }
+        summary.add(&layer, "cut", cut);
     }
     summary.add("layers", "stack", stack::run(run, &body)?);
     if goal >= Goal::Avatar {
@@ -144,6 +141,7 @@ impl Summary {
     fn add(&mut self, layer: &str, stage: &str, record: Record) {
         self.warnings.extend(record.warnings.iter().cloned());
         self.lost.extend(record.lost.iter().cloned());
+        self.failures.extend(record.failures.iter().cloned());
         self.stages.push((format!("{layer}/{stage}"), record));
     }
 

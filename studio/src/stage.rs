@@ -47,6 +47,8 @@ pub struct Product {
     pub warnings: Vec<String>,
     /// Recorded data that was lost, a sentence each.
     pub lost: Vec<String>,
+    /// What failed although the run goes on, a sentence each.
+    pub failures: Vec<String>,
     /// Milliseconds by step and the like.
     pub timings: Value,
 }
@@ -70,6 +72,9 @@ pub struct Record {
     pub warnings: Vec<String>,
     /// Recorded data that was lost.
     pub lost: Vec<String>,
+    /// What failed although the run went on.
+    #[serde(default)]
+    pub failures: Vec<String>,
 }
 
 /// All stages that worked in one folder.
@@ -146,8 +151,8 @@ impl Stage<'_> {
         let hash_of = |bytes: &[u8]| if self.outputs_vary { String::new() } else { hash::bytes(bytes) };
         let outputs = product.files.iter().map(|(p, bytes)| (self.relative(p), hash_of(bytes))).collect();
         let (settings, version) = (self.settings.clone(), self.version);
-        let Product { files, result, warnings, lost, timings } = product;
-        let record = Record { version, hash, inputs, settings, outputs, result, warnings, lost };
+        let Product { files, result, warnings, lost, failures, timings } = product;
+        let record = Record { version, hash, inputs, settings, outputs, result, warnings, lost, failures };
         disk::write_all_whole(&files)?;
         self.write_timings(timings, started)?;
         let mut report = read_report(&self.folder);

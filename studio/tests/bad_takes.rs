@@ -78,6 +78,57 @@ fn a_garment_take_that_shows_no_new_garment() {
     assert!(page.contains("no new garment"), "the report says so too");
 }
 
+/// A subject whose takes are copies of `takes` of another one, as layers of these names and without told types.
+fn session_of(from: &Path, to: &Path, takes: &[(&str, &str)]) {
+    fs::create_dir_all(to.join("takes")).unwrap();
+    let mut toml = String::from("name = \"eva\"\n");
+    for (number, (take, name)) in takes.iter().enumerate() {
+        fs::copy(from.join(format!("takes/{take}.mcap")), to.join(format!("takes/{number:02}-{name}.mcap"))).unwrap();
+        toml.push_str(&format!("\n[[layers]]\nname = \"{name}\"\n"));
+    }
+    fs::write(to.join("subject.toml"), toml).unwrap();
+}
+
+#[test]
+fn nothing_new_something_taken_off_and_two_at_once_are_said_and_the_other_takes_are_used() {
+    let dir = tempfile::tempdir().unwrap();
+    let made = dir.path().join("made");
+    let words = ["--garments", "trousers,tshirt", "--frames", "60", "--seed", "5"];
+    exits(0, toile().arg("synthesize").arg("--out").arg(&made).args(words));
+
+    let eva = dir.path().join("eva");
+    let (first, second, third) = ("00-body", "01-trousers", "02-tshirt");
+    session_of(&made, &eva, &[(first, "body"), (second, "one"), (second, "again"), (third, "two"), (second, "less")]);
+    let answer = exits(1, toile().arg("process").arg(&eva));
+    let failures: Vec<&str> = answer["failures"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
+    assert_eq!(failures.len(), 2, "{answer}");
+    assert!(failures[0].contains("takes/02-again.mcap") && failures[0].contains("no new garment"), "{answer}");
+    assert!(failures[1].contains("takes/04-less.mcap") && failures[1].contains("no new garment"), "{answer}");
+    let said = |warnings: &serde_json::Value, layer: &str, what: &str| {
+        warnings
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|w| w.as_str().unwrap().starts_with(layer) && w.to_string().contains(what))
+    };
+    assert!(said(&answer["warnings"], "04-less", "taken off") && !said(&answer["warnings"], "02-again", "taken off"));
+    assert!(!answer["warnings"].to_string().contains("two garments"), "{answer}");
+    assert_eq!(answer["results"][0]["layers"], serde_json::json!(["body", "01-one", "03-two"]), "{answer}");
+    let record: serde_json::Value =
+        serde_json::from_slice(&fs::read(eva.join("build/04-less/report.json")).unwrap()).unwrap();
+    let cut = &record["stages"]["cut"];
+    assert!(cut["failures"].to_string().contains("no new garment") && said(&cut["warnings"], "04-less", "taken off"));
+    let again = exits(1, toile().arg("extract").arg(&eva));
+    assert_eq!((&again["failures"], &again["warnings"]), (&answer["failures"], &answer["warnings"]), "said each time");
+
+    let both = dir.path().join("both");
+    session_of(&made, &both, &[(first, "body"), (third, "both")]);
+    let answer = exits(0, toile().arg("extract").arg(&both));
+    assert!(said(&answer["warnings"], "01-both", "two garments"), "{answer}");
+    assert_eq!(answer["results"]["layers"], serde_json::json!(["body", "01-both"]), "{answer}");
+    assert!(both.join("build/01-both/garment.ply").is_file());
+}
+
 #[test]
 fn a_full_disk_while_processing_leaves_no_half_file_and_the_next_run_goes_on() {
     let (_dir, subject) = copy_of_olga();

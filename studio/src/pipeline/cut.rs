@@ -1,7 +1,8 @@
 //! Stage `cut`: the new garment out of a dressed take's scan.
 //!
 //! Reads the scan, the scan of the take before, both poses, the body, and the layer's edits where there are any. Writes `cut.ply`, the garment in the take's
-//! own pose and frame, and `unstacked.ply`, the same in the common frame with its skin weights as vertex attributes.
+//! own pose and frame, and `unstacked.ply`, the same in the common frame with its skin weights as vertex attributes. Both are
+//! empty where nothing new is worn: the record then tells of a failure, and the layer is left out.
 
 use std::path::Path;
 
@@ -21,14 +22,14 @@ use crate::{
 };
 
 /// Raised whenever the same inputs and settings give another garment.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// Expected seconds.
 pub const COST: f64 = 3.0;
 
 /// Cuts the garment of take `n` (1 or more), unless that is up to date.
 ///
 /// # Errors
-/// [`StudioError`] where the take shows no new garment, or files cannot be read or written.
+/// [`StudioError`] where a mesh is broken, or files cannot be read or written.
 pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
     let told = run.garment_type(n);
     let folders = &run.folders;
@@ -90,10 +91,14 @@ pub fn read_edits(path: &Path) -> Result<Edits, StudioError> {
 }
 
 fn product(run: &Run, layer: &str, found: &Extraction) -> Result<Product, StudioError> {
-    if found.warnings.contains(&Warning::NothingNew) {
-        return Err(StudioError::NothingNew { path: run.take(layer), reason: Warning::NothingNew.to_string() });
-    }
-    let mut warnings: Vec<String> = found.warnings.iter().map(|w| format!("{layer}: {w}")).collect();
+    let (nothing, other): (Vec<_>, Vec<_>) = found.warnings.iter().partition(|w| **w == Warning::NothingNew);
+    let left_out = |w| {
+        format!(
+            "{}: {w}; the avatar goes without it; record it again and import it with --retake",
+            run.take(layer).display()
+        )
+    };
+    let mut warnings: Vec<String> = other.into_iter().map(|w| format!("{layer}: {w}")).collect();
     if found.report.unsure_share > UNSURE_SHARE {
         let percent = 100.0 * found.report.unsure_share;
         warnings.push(format!(
@@ -107,6 +112,7 @@ fn product(run: &Run, layer: &str, found: &Extraction) -> Result<Product, Studio
         ],
         result: plain(&found.report)?,
         warnings,
+        failures: nothing.into_iter().map(left_out).collect(),
         ..Product::default()
     })
 }

@@ -61,7 +61,8 @@ pub fn fuse_recording(
             (outputs[0].clone(), ply::encode(&scan.mesh)),
             (outputs[1].clone(), scan.trajectory_tum().into_bytes()),
         ];
-        Ok(Product { files, warnings, lost, result: plain(&scan.report)?, timings: plain(&scan.timings)? })
+        let (result, timings) = (plain(&scan.report)?, plain(&scan.timings)?);
+        Ok(Product { files, warnings, lost, result, timings, ..Product::default() })
     })
 }
 

@@ -95,15 +95,14 @@ impl<'a> Run<'a> {
         (1..self.layers.len()).filter(|&n| !self.left_out.contains(&self.layers[n]))
     }
 
-    /// Leaves a layer in which nothing new was found out of the avatar, with what an earlier run made of it.
+    /// Leaves a layer in which nothing new was found out of the avatar, with the garment that an earlier run made of it.
     ///
     /// # Errors
     /// [`StudioError::Io`] where an old file cannot be removed.
     pub fn leave_out(&mut self, layer: &str) -> Result<(), StudioError> {
-        for path in [self.folders.cut(layer), self.folders.unstacked(layer), self.folders.garment(layer)] {
-            if path.exists() {
-                fs::remove_file(&path).map_err(|e| StudioError::io(&path, e))?;
-            }
+        let path = self.folders.garment(layer);
+        if path.exists() {
+            fs::remove_file(&path).map_err(|e| StudioError::io(&path, e))?;
         }
         self.left_out.push(layer.to_string());
         Ok(())
