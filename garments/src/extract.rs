@@ -36,14 +36,22 @@ const SUNKEN_AREA: f32 = 0.03;
 const FOLLOWS: f32 = 0.06;
 /// New cloth on this share of the inner thighs goes around each leg by itself.
 pub(crate) const LEGS_APART: f32 = 0.2;
-/// Attribute of the scan that tells where nothing was seen beyond.
+/// Attribute of the scan that tells where nothing was seen beyond; rims with more than this share of it are free edges.
 const FREE: &str = "unseen_around";
+const FREE_SHARE: f32 = 0.25;
+/// Attribute of the scan: distance from what was worn before, metres; rims further from it stand above a ledge. Their cloth
+/// is seen but for half of the last pixel, a third of what a free edge loses.
+const CLEARANCE: &str = "clearance";
+const ABOVE_LEDGE: f32 = 0.02;
+const LEDGE_LOSS: f32 = 1.0 / 3.0;
 /// Rims with fewer vertices are small holes, and left as they are.
 const LEAST_RIM: usize = 20;
 /// What crosses itself this near to a rim, and cannot be smoothed apart, is cut away, metres.
 const CRUMPLED: f32 = 0.04;
 /// Rounds of that.
 const CRUMPLED_ROUNDS: usize = 4;
+/// Rounds in which steps are taken off at the hem.
+const STEP_ROUNDS: usize = 3;
 /// Labels less sure than this are marked as unsure.
 const UNSURE: f32 = 0.7;
 
@@ -160,7 +168,7 @@ pub fn extract(
     let pieces = clean::drop_islands(&graph, &mut labels, settings);
     progress(0.6);
     let applied = take.edits.map(|e| e.apply(take.scan, &graph, &evidence, &mut labels, settings));
-    let mut in_take = garment_mesh(take, &graph, &labels, applied.as_ref(), settings);
+    let mut in_take = garment_mesh(take, &graph, &evidence, &labels, garment_type, applied.as_ref(), settings);
     if matches!(garment_type, GarmentType::Skirt | GarmentType::Dress) && !in_take.is_empty() {
         in_take.attributes.insert(FREE_PART.into(), mark_free(take.body, &in_take));
     }
@@ -215,7 +223,8 @@ fn label(
     }
 }
 
-/// Moves the border from the foot of each hem's step half-way up.
+/// Moves the border from the foot of each hem's step half-way up, and on to the fold where a ledge is wider than what is
+/// looked at in a round.
 fn take_off_steps(
     take: &Take,
     graph: &ScanGraph,
@@ -226,8 +235,18 @@ fn take_off_steps(
 ) {
     let colors = labels::color_model(graph, labels);
     let facing = garment_type == GarmentType::Jacket;
-    hem::lower_steps(take.scan, graph, evidence, labels, &colors, facing, settings);
-    labels::relabel(graph, evidence, labels, settings);
+    for round in 0..STEP_ROUNDS {
+        let before = labels.garment.clone();
+        hem::lower_steps(take.scan, graph, evidence, labels, &colors, facing, settings);
+        if !(facing && round > 0) {
+            // A facing turns in and would be eaten up round by round.
+            hem::lower_slopes(take.scan, graph, evidence, labels, &colors, facing, settings);
+        }
+        labels::relabel(graph, evidence, labels, settings);
+        if labels.garment == before {
+            break;
+        }
+    }
 }
 
 /// Type from what is covered, what follows the inner thighs and whether the front is open.
@@ -321,7 +340,9 @@ fn front_is_open(take: &Take, labels: &Labels) -> bool {
 fn garment_mesh(
     take: &Take,
     graph: &ScanGraph,
+    evidence: &Evidence,
     labels: &Labels,
+    garment_type: GarmentType,
     edits: Option<&Applied>,
     settings: &ExtractSettings,
 ) -> Mesh {
@@ -330,8 +351,12 @@ fn garment_mesh(
     }
     let mut field = cut::smooth_field(graph, &take.scan.positions, &labels.garment, settings.hem_smoothing);
     let mut unseen = unseen_around(graph, take.scan);
+    // The turned-in edge of a jacket or coat lies behind its fold: nothing is lost there.
+    let has_facing = garment_type == GarmentType::Jacket;
+    let clear = |c: &f32| if has_facing { 0.0 } else { c.min(settings.reach) };
+    let mut clearance: Vec<f32> = evidence.clearance.iter().map(clear).collect();
     if let Some(edits) = edits {
-        follow_edits(edits, &mut field, &mut unseen, settings.hem_smoothing);
+        follow_edits(edits, &mut field, [&mut unseen, &mut clearance], settings.hem_smoothing);
     }
     let mut scan = take.scan.clone();
     scan.normals.clear();
@@ -339,13 +364,14 @@ fn garment_mesh(
     scan.attributes.entry("filled".into()).or_insert_with(|| vec![0.0; graph.len()]);
     scan.attributes.insert("confidence".into(), labels.confidence.clone());
     scan.attributes.insert(FREE.into(), unseen);
+    scan.attributes.insert(CLEARANCE.into(), clearance);
     let bones = bones(take);
     clean::close_hidden(&mut scan, &labels.garment, &bones);
     let mut mesh = cut::cut_positive(&scan, &field);
     mesh = clean::keep_large_pieces(&mesh, settings.piece_share);
     clean::fill_holes(&mut mesh, &bones, settings.hole_rim);
-    rim::extend(&mut mesh, FREE, settings.edge_loss);
-    mesh.attributes.remove(FREE);
+    let lost = lost_at_rims(&mut mesh, settings);
+    rim::extend(&mut mesh, &lost);
     mesh = remesh::isotropic(&mesh, settings.edge_length);
     mesh = clean::keep_large_pieces(&clean::drop_strips(&mesh), settings.piece_share);
     rim::smooth(&mut mesh, settings.rim_smoothing, LEAST_RIM);
@@ -362,11 +388,25 @@ fn garment_mesh(
 }
 
 /// The field's zero line runs along hem lines; an edited rim stays where it was put.
-fn follow_edits(edits: &Applied, field: &mut [f32], unseen: &mut [f32], smoothing: f32) {
+fn follow_edits(edits: &Applied, field: &mut [f32], lost: [&mut [f32]; 2], smoothing: f32) {
     for (f, d) in field.iter_mut().zip(&edits.hem_distance).filter(|(_, d)| d.is_finite()) {
         *f = (d / smoothing.max(1e-4)).clamp(-1.0, 1.0);
     }
-    unseen.iter_mut().zip(&edits.near).filter(|(_, near)| **near).for_each(|(u, _)| *u = 0.0);
+    for values in lost {
+        values.iter_mut().zip(&edits.near).filter(|(_, near)| **near).for_each(|(x, _)| *x = 0.0);
+    }
+}
+
+/// How much cloth the scan lacks beyond each vertex, were it on a rim, metres. Takes the attributes that tell it.
+fn lost_at_rims(mesh: &mut Mesh, settings: &ExtractSettings) -> Vec<f32> {
+    let mut taken = |name: &str| mesh.attributes.remove(name).unwrap_or_default();
+    let (unseen, clearance) = (taken(FREE), taken(CLEARANCE));
+    let lost = |(&unseen, &clearance): (&f32, &f32)| match () {
+        () if unseen > FREE_SHARE => settings.edge_loss,
+        () if clearance > ABOVE_LEDGE => LEDGE_LOSS * settings.edge_loss,
+        () => 0.0,
+    };
+    unseen.iter().zip(&clearance).map(lost).collect()
 }
 
 /// 1 where the scan ends or was closed without being seen, less around it.

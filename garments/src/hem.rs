@@ -37,10 +37,10 @@ const LEAST_BEHIND: f32 = 5e-5;
 /// over from the front of the cloth and tells nothing.
 const LEVEL: f32 = 0.7;
 /// Nearer to what was worn before, a pixel's blur colours a step, metres.
-const LEDGE: f32 = 0.012;
+const LEDGE: f32 = 0.006;
 
-/// Lowers the log odds of the steps at the garment's border. Where it has a `facing` (jackets and coats), what has the
-/// garment's colour past a fold, and was seen, is its turned-in edge and stays.
+/// Lowers the log odds of the steps at the garment's border: what faces away from what was worn before. What has the
+/// garment's colour stays, but for ledges; where it has a `facing` (jackets and coats), these too.
 pub fn lower_steps(
     scan: &Mesh,
     graph: &ScanGraph,
@@ -52,16 +52,37 @@ pub fn lower_steps(
 ) {
     let depth = settings.hem_depth;
     let reached = border_distance(scan, graph, labels, depth);
-    let level = |v: usize| graph.normals[v].y.abs() > LEVEL;
-    let ledge = |v: usize| !facing && level(v) && evidence.clearance[v] > LEDGE;
+    let ledge = |v: usize| !facing && level(graph, v) && evidence.clearance[v] > LEDGE;
     let steps = step_vertices(graph, evidence, labels, &reached, |v| color_odds[v] > STEP_COLOR && !ledge(v));
+    lower(labels, steps.into_iter());
+}
+
+/// Lowers the log odds of what lies low against the cloth behind the border, and of what is turned away from it. Where
+/// the garment has a `facing`, what has its colour past a fold, and was seen, is its turned-in edge and stays.
+pub fn lower_slopes(
+    scan: &Mesh,
+    graph: &ScanGraph,
+    evidence: &Evidence,
+    labels: &mut Labels,
+    color_odds: &[f32],
+    facing: bool,
+    settings: &ExtractSettings,
+) {
+    let depth = settings.hem_depth;
+    let reached = border_distance(scan, graph, labels, depth);
     let slopes = slope_vertices(scan, graph, evidence, labels, &reached, depth);
     let lips = lip_vertices(scan, graph, labels, &reached, depth);
-    let seen = |v: usize| graph.filled[v] < 0.5 && !level(v);
+    let seen = |v: usize| graph.filled[v] < 0.5 && !level(graph, v);
     let turned_in = |v: &u32| facing && color_odds[*v as usize] > STEP_COLOR && seen(*v as usize);
-    for v in steps.into_iter().chain(slopes).chain(lips.into_iter().filter(|v| !turned_in(v))) {
-        labels.log_odds[v as usize] = labels.log_odds[v as usize].min(SLOPE_ODDS);
-    }
+    lower(labels, slopes.into_iter().chain(lips.into_iter().filter(|v| !turned_in(v))));
+}
+
+fn level(graph: &ScanGraph, v: usize) -> bool {
+    graph.normals[v].y.abs() > LEVEL
+}
+
+fn lower(labels: &mut Labels, vertices: impl Iterator<Item = u32>) {
+    vertices.for_each(|v| labels.log_odds[v as usize] = labels.log_odds[v as usize].min(SLOPE_ODDS));
 }
 
 /// Distance over the garment from its border (infinite beyond `depth` and outside), along edges.

@@ -13,7 +13,7 @@ const SAME_COLOR: f32 = 3.0;
 /// Normals of one cloth differ by less than this (cosine) from vertex to vertex: over a hem's step they differ more.
 const ONE_CLOTH: f32 = 0.8;
 /// A patch swung when this share of its border is what was worn before; the rest may be new cloth that lies over it.
-const AMONG_OLD: f32 = 0.5;
+const AMONG_OLD: f32 = 0.6;
 /// Scan this far inside what was worn before was uncovered or pressed in, metres, and at least this many noise scales.
 const INSIDE: f32 = 0.003;
 const INSIDE_NOISE: f32 = 2.0;
@@ -34,7 +34,9 @@ pub fn drop_swung(graph: &ScanGraph, evidence: &Evidence, labels: &mut Labels) {
         let slack = evidence.body_distance[v] - evidence.height[v];
         slack > LOOSE && evidence.height[v].abs() < SWING * slack
     };
-    let may = |v: usize| labels.garment[v] && near(v) && (reached[v] || evidence.color[v] < same);
+    // The fold at the edge of what is reached belongs to it.
+    let fold = |v: usize| graph.neighbors.of(v).iter().any(|&n| reached[n as usize]);
+    let may = |v: usize| labels.garment[v] && (reached[v] || fold(v) || (near(v) && evidence.color[v] < same));
     let (set, areas) = graph.components(may);
     // Border to what was worn before, border to new cloth, and whether old cloth goes on into the patch.
     let (mut border, mut connected) = (vec![[0.0f32; 2]; areas.len()], vec![false; areas.len()]);
@@ -64,7 +66,8 @@ fn reached_from_old(graph: &ScanGraph, evidence: &Evidence, labels: &Labels) -> 
             let far = best[v] + graph.step(v, n);
             let goes_on = graph.normals[v].dot(&graph.normals[n]) > ONE_CLOTH
                 && color::difference(&graph.lab[from as usize], &graph.lab[n]) < same;
-            if labels.garment[n] && goes_on && far < best[n] && far < SWING * evidence.body_distance[n] {
+            let loose = evidence.body_distance[n] > LOOSE.max(far / SWING);
+            if labels.garment[n] && goes_on && loose && far < best[n] {
                 (best[n], origin[n]) = (far, from);
                 queue.push_back(n as u32);
             }

@@ -9,8 +9,6 @@ use toile_geometry::{
     topology::{VertexNeighbors, boundary_loops},
 };
 
-/// Vertices with more than this share of unseen surroundings lie on a free edge.
-const FREE: f32 = 0.25;
 /// Directions and widths are smoothed along the rim by this many steps of two neighbours.
 const RIM_STEPS: usize = 12;
 /// Rings of triangles behind the rim between which the cloth's direction is read.
@@ -18,15 +16,13 @@ const CLOTH_RINGS: [usize; 2] = [2, 5];
 /// Narrower strips are not added, metres.
 const LEAST_WIDTH: f32 = 0.001;
 
-/// Grows a strip of up to `width` metres on those parts of the rims where the attribute `free` says that nothing was
-/// seen beyond. New vertices carry `filled` = 1.
-pub fn extend(mesh: &mut Mesh, free: &str, width: f32) {
-    let Some(shares) = mesh.attributes.get(free).cloned().filter(|_| width > LEAST_WIDTH) else { return };
+/// Grows a strip on the rims, of the width that `widths` tells for each vertex (metres), smoothed along the rim. New
+/// vertices carry `filled` = 1.
+pub fn extend(mesh: &mut Mesh, widths: &[f32]) {
     let normals = mesh.vertex_normals();
     let neighbors = VertexNeighbors::new(mesh.positions.len(), &mesh.triangles);
     for rim in boundary_loops(&mesh.triangles).into_iter().filter(|l| l.len() >= 8) {
-        let wanted = |&v: &u32| if shares[v as usize] > FREE { width } else { 0.0 };
-        let widths = smoothed(rim.iter().map(wanted).collect(), RIM_STEPS);
+        let widths = smoothed(rim.iter().map(|&v| widths[v as usize]).collect(), RIM_STEPS);
         let cloth: Vec<Vector3<f32>> = rim.iter().map(|&v| cloth_normal(&normals, &neighbors, v)).collect();
         let outward = smoothed(outward(mesh, &cloth, &rim), RIM_STEPS);
         add_strip(mesh, &rim, &widths, &outward);
@@ -192,10 +188,9 @@ mod tests {
     #[test]
     fn a_free_rim_grows_along_the_surface_and_a_seen_one_stays() {
         let mut mesh = tube(0.0);
-        let free = mesh.positions.iter().map(|p| f32::from(u8::from(p.y > 0.09))).collect();
-        mesh.attributes.insert("free".into(), free);
+        let widths: Vec<f32> = mesh.positions.iter().map(|p| if p.y > 0.09 { 0.008 } else { 0.0 }).collect();
         let area = mesh.area();
-        extend(&mut mesh, "free", 0.008);
+        extend(&mut mesh, &widths);
         let (lo, hi) = mesh.bounds().unwrap();
         assert!((hi[1] - 0.108).abs() < 1e-4 && lo[1].abs() < 1e-6, "{lo} {hi}");
         assert!((mesh.area() / area - 1.08).abs() < 0.01);

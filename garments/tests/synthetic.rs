@@ -466,3 +466,52 @@ fn a_bare_arm_that_touches_the_torso_is_no_cloth() {
     let iou = iou_of(&scan, &found.labels.garment, |p| cloth(p.y, angle(p)));
     assert!(iou > 0.96, "{iou}");
 }
+
+const RED: [u8; 3] = [170, 40, 40];
+
+/// A coat 60 mm off the body, open in front from −`edge` to `edge` radians, and a scarf above it.
+fn in_open_coat(edge: f32, has_scarf: bool) -> Mesh {
+    let mut scan = column(|y, a| RADIUS + noise(y, a), |_| SKIN);
+    for v in 0..scan.positions.len() {
+        let p = scan.positions[v];
+        let a = p.x.atan2(p.z);
+        let (off, color) = match p.y {
+            y if inside(y) && a.abs() > edge => (0.06, BLUE),
+            y if has_scarf && (0.9..1.0).contains(&y) => (0.01, RED),
+            _ => continue,
+        };
+        let at = RADIUS + noise(p.y, a) + off;
+        (scan.positions[v], scan.colors[v]) = (Point3::new(at * a.sin(), p.y, at * a.cos()), color);
+    }
+    scan
+}
+
+#[test]
+fn a_coat_that_swings_is_not_new_and_a_scarf_over_it_is() {
+    let (person, pose) = (person(), Pose::identity());
+    let before = in_open_coat(0.5, false);
+    let is_scarf = |p: &Point3<f32>| (0.9..1.0).contains(&p.y);
+    for edge in [0.5, 0.4] {
+        let run = |has_scarf: bool| {
+            let scan = in_open_coat(edge, has_scarf);
+            let found = extract(&take(&person, &scan, &before, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+            (scan, found)
+        };
+        let (scan, found) = run(true);
+        let iou = iou_of(&scan, &found.labels.garment, is_scarf);
+        assert!(iou > 0.95 && found.warnings.is_empty(), "{edge}: {iou}, {:?}", found.warnings);
+        let (_, found) = run(false);
+        assert_eq!(found.warnings, [Warning::NothingNew], "{edge}");
+    }
+}
+
+#[test]
+fn what_was_uncovered_is_not_new() {
+    let (person, pose) = (person(), Pose::identity());
+    let (bare, dressed) = (column(|y, a| RADIUS + noise(y, a), |_| SKIN), dressed(0.01, BLUE));
+    let found = extract(&take(&person, &bare, &dressed, &pose), &ExtractSettings::default(), &|_| ()).unwrap();
+    assert!(found.in_take.is_empty() && found.garment.is_empty());
+    let [Warning::NothingNew, Warning::TakenOff(area)] = found.warnings[..] else { panic!("{:?}", found.warnings) };
+    let cloth = std::f32::consts::TAU * RADIUS * 0.5;
+    assert!((area / cloth - 1.0).abs() < 0.15, "{area} m² of {cloth}");
+}

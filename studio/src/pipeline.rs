@@ -119,11 +119,12 @@ fn dress(
     let body = body_file::Body::load(&run.folders, run.first_layer(), model)?;
     for n in 1..run.layers.len() {
         let layer = run.layers[n].clone();
-        summary.add(&layer, "pose", pose::run(run, n, &body, model)?);
-        let cut = cut::run(run, n, &body)?;
+        let pose = pose::run(run, n, &body, model)?;
+        let cut = cut::run(run, n, pose::worn_as(run, n, &pose), &body)?;
         if !cut.failures.is_empty() {
             run.leave_out(&layer)?;
         }
+        summary.add(&layer, "pose", pose);
         summary.add(&layer, "cut", cut);
     }
     summary.add("layers", "stack", stack::run(run, &body)?);

@@ -1,6 +1,6 @@
 //! Stage `cut`: the new garment out of a dressed take's scan.
 //!
-//! Reads the scan, the scan of the take before, both poses, the body, and the layer's edits where there are any. Writes `cut.ply`, the garment in the take's
+//! Reads the scan, the scan of the take that it is compared with, both poses, the body, and the layer's edits where there are any. Writes `cut.ply`, the garment in the take's
 //! own pose and frame, and `unstacked.ply`, the same in the common frame with its skin weights as vertex attributes. Both are
 //! empty where nothing new is worn: the record then tells of a failure, and the layer is left out.
 
@@ -26,14 +26,14 @@ const VERSION: u32 = 6;
 /// Expected seconds.
 pub const COST: f64 = 3.0;
 
-/// Cuts the garment of take `n` (1 or more), unless that is up to date.
+/// Cuts what take `n` (1 or more) wears and take `worn_as` does not, unless that is up to date.
 ///
 /// # Errors
 /// [`StudioError`] where a mesh is broken, or files cannot be read or written.
-pub fn run(run: &Run, n: usize, body: &Body) -> Result<Record, StudioError> {
+pub fn run(run: &Run, n: usize, worn_as: usize, body: &Body) -> Result<Record, StudioError> {
     let told = run.garment_type(n);
     let folders = &run.folders;
-    let (layer, before) = (run.layers[n].as_str(), run.layers[n - 1].as_str());
+    let (layer, before) = (run.layers[n].as_str(), run.layers[worn_as].as_str());
     let settings = ExtractSettings::default();
     let paths = [layer, before].map(|l| (folders.scan(l), folders.pose(l)));
     let edits_path = Some(folders.edits(layer)).filter(|p| p.exists());
