@@ -59,6 +59,53 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
+    use crate::contacts::Anchor;
+
+    /// A sheet over nothing with one vertex that was pushed through its neighbours' triangles.
+    fn folded() -> WornSurface {
+        let n = 31u32;
+        let at = |i: u32| Point3::new((i % n) as f32 * 0.01, (i / n) as f32 * 0.01, 0.0);
+        let triangles = (0..n - 1)
+            .flat_map(|j| (0..n - 1).map(move |i| j * n + i))
+            .flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]])
+            .collect();
+        let mut mesh = Mesh::new((0..n * n).map(at).collect(), triangles);
+        mesh.positions[(10 * n + 10) as usize] = Point3::new(0.125, 0.125, -0.002);
+        mesh.positions[(11 * n + 11) as usize].z = 0.004;
+        mesh.positions[(10 * n + 11) as usize] = Point3::new(0.095, 0.118, 0.003);
+        WornSurface::new(&mesh, 0.0015)
+    }
+
+    #[test]
+    fn crossings_within_a_layer_are_cut_where_they_are_new_and_left_where_they_were() {
+        let below = || WornSurface::new(&Mesh::default(), 0.0);
+        let pairs = |s: &WornSurface| self_crossings(&s.mesh, &s.bvh);
+        let mut surfaces = [below(), folded()];
+        let before = pairs(&surfaces[1]);
+        assert!(!before.is_empty());
+        assert_eq!(cut_rest(&mut surfaces, 1, &before, &[]), 0);
+        assert_eq!(pairs(&surfaces[1]), before);
+        let cut = cut_rest(&mut surfaces, 1, &[], &[]);
+        assert!(0 < cut && cut <= before.len(), "{cut} of {before:?}");
+        assert!(pairs(&surfaces[1]).is_empty());
+    }
+
+    #[test]
+    fn only_what_lacks_half_a_gap_is_cut_for_being_near() {
+        let sheet = folded().mesh;
+        let contact = |v: u32, lacks: f32| {
+            let upper = Anchor { surface: 1, corners: [v; 3], weights: [1.0, 0.0, 0.0] };
+            let lower = Anchor { surface: 0, corners: [0; 3], weights: [1.0, 0.0, 0.0] };
+            Contact { upper, lower, by: nalgebra::Vector3::z() * lacks * 0.0015 }
+        };
+        let (near, enough) = (20 * 31 + 20, 25 * 31 + 5);
+        let mut surfaces = [WornSurface::new(&Mesh::default(), 0.0), WornSurface::new(&sheet, 0.0015)];
+        let own = self_crossings(&surfaces[1].mesh, &surfaces[1].bvh);
+        let left = [contact(near, 0.51), contact(enough, 0.49)];
+        assert_eq!(cut_rest(&mut surfaces, 1, &own, &left), 6);
+        let kept: Vec<[u32; 3]> = sheet.triangles.into_iter().filter(|t| !t.contains(&near)).collect();
+        assert_eq!(surfaces[1].mesh.triangles, kept);
+    }
 
     #[test]
     fn a_spike_through_a_sheet_is_cut_and_a_sheet_through_a_sheet_is_not() {
@@ -73,7 +120,12 @@ mod tests {
         };
         let spike = |i: u32, j: u32| if (i, j) == (15, 15) { -0.005 } else { 0.003 };
         let mut surfaces = [sheet(&|_, _| 0.0), sheet(&spike)];
-        assert_eq!(cut_rest(&mut surfaces, 1, &[], &[]), 6);
+        let around: Vec<[u32; 3]> =
+            surfaces[1].mesh.triangles.iter().filter(|t| t.contains(&(15 * n + 15))).copied().collect();
+        let whole = surfaces[1].mesh.triangles.clone();
+        assert_eq!(cut_rest(&mut surfaces, 1, &[], &[]), around.len());
+        let kept: Vec<[u32; 3]> = whole.into_iter().filter(|t| !around.contains(t)).collect();
+        assert_eq!((surfaces[1].mesh.triangles.clone(), around.len()), (kept, 6), "those of the spike and no others");
         assert_eq!(surfaces[1].mesh.positions.len() as u32, n * n);
         assert!(surfaces[1].mesh.positions.iter().all(|p| p.z == 0.003), "nothing strays");
         assert_eq!(cut_rest(&mut surfaces, 1, &[], &[]), 0);
