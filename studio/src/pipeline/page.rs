@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Raised whenever the page looks different.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
 /// Times of the motion that are shown.
@@ -131,14 +131,20 @@ fn stacked(garments: &[&str], summary: &Summary) -> Vec<Vec<String>> {
     };
     let row = |(k, layer): (usize, &&str)| {
         let (rest, walk) = (&found["layers"][k], &found["walking"][k]);
+        let own = |when: usize| rest["self_crossings"][when].as_f64();
+        let added = own(0).zip(own(1)).map(|(before, after)| (after - before).max(0.0));
         vec![
             layer.to_string(),
             text(&rest["moved_seen_mean_m"], 1e3, 2),
             text(&rest["moved_seen_p95_m"], 1e3, 2),
+            text(&rest["gap_m"], 1e3, 1),
             text(&rest["least_gap_m"], 1e3, 1),
             text(&rest["crossing_pairs"], 1.0, 0),
+            text(&json!(added), 1.0, 0),
             text(&walk["crossing_pairs_mean"], 1.0, 0),
+            text(&walk["touching_pairs_mean"], 1.0, 0),
             text(&walk["stretch_most"], 1.0, 1),
+            text(&found["free_share"][k], 1e2, 0),
         ]
     };
     garments.iter().enumerate().map(row).collect()

@@ -123,14 +123,18 @@ fn worries(page: &mut Page, contents: &Contents) {
 }
 
 /// What is told of stacking; "seen" is where the scan saw the garment.
-const STACKED: [&str; 7] = [
+const STACKED: [&str; 11] = [
     "stacking",
     "moved where seen, mean mm",
     "p95 mm",
+    "gap aimed at, mm",
     "least gap, mm",
     "crossing pairs",
-    "crossing pairs in the walk",
+    "self-crossings added",
+    "poking through in the walk, pairs",
+    "limbs that meet in the walk, pairs",
     "largest stretch in the walk",
+    "hangs free, %",
 ];
 
 /// Per cent of each garment's vertices by their gap to what is below.

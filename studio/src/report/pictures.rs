@@ -180,7 +180,11 @@ pub fn garment(garment: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderError>
 /// [`RenderError`] where the mesh cannot be drawn.
 pub fn doubts(garment: &Mesh) -> Result<Vec<Picture>, RenderError> {
     let mut pictures = Vec::new();
-    for (name, range, caption) in [("confidence", (0.5, 1.0), "how sure"), ("filled", (0.0, 1.0), "filled")] {
+    for (name, range, caption) in [
+        ("confidence", (0.5, 1.0), "dark: unsure"),
+        ("filled", (0.0, 1.0), "bright: filled"),
+        ("free", (0.0, 1.0), "bright: hangs free"),
+    ] {
         if garment.attributes.contains_key(name) {
             let drawn = [Drawn::attribute(garment, name, range)];
             for (heading, side) in [(0.0, "front"), (PI, "back")] {
