@@ -25,7 +25,7 @@ pub(crate) struct JointName {
 pub(crate) const UPPER_LEG: &[&str] = &["upperleg", "upleg", "thigh", "thighbend", "femur", "hip", "leg"];
 pub(crate) const LOWER_LEG: &[&str] = &["lowerleg", "loleg", "lowleg", "shin", "calf", "knee", "tibia", "leg"];
 pub(crate) const FOOT: &[&str] = &["ankle", "talocrural", "foot"];
-pub(crate) const TOES: &[&str] = &["toes", "toebase", "toe", "ball", "metatarsal", "foot"];
+pub(crate) const TOES: &[&str] = &["toes", "toebase", "toe", "ball", "metatarsal", "metatarsophalangeal", "foot"];
 pub(crate) const CLAVICLE: &[&str] = &["clavicle", "collar", "collarbone", "sternoclavicular", "shoulder"];
 pub(crate) const UPPER_ARM: &[&str] = &["upperarm", "uparm", "humerus", "arm", "shldr", "shldrbend", "shoulder"];
 pub(crate) const LOWER_ARM: &[&str] =
@@ -74,6 +74,9 @@ impl JointName {
             let (&finger, rest) = self.numbers.split_first()?;
             return (1..=5).contains(&finger).then(|| (finger as usize - 1, rest.first().copied().unwrap_or(1)));
         }
+        if self.part.ends_with("phalangeal") || self.part == "carpometacarpal" {
+            return self.hanim_finger();
+        }
         let finger = FINGERS.iter().position(|names| names.iter().any(|n| self.part.contains(n)))?;
         let thumb = finger == 0;
         let segment = match self.numbers.last() {
@@ -83,6 +86,20 @@ impl JointName {
             None if self.part.ends_with("intermediate") => 2,
             None if self.part.ends_with("distal") => 3,
             None => 1,
+        };
+        Some((finger, segment))
+    }
+
+    /// H-Anim names the joint and numbers the finger, 1 the thumb: `l_carpal_proximal_interphalangeal_2`.
+    fn hanim_finger(&self) -> Option<(usize, u32)> {
+        let finger = self.numbers.last().filter(|n| (1..=5).contains(*n))?.checked_sub(1)? as usize;
+        let thumb = finger == 0;
+        let segment = match self.part.as_str() {
+            "carpometacarpal" if thumb => 1,
+            "metacarpophalangeal" => 1 + u32::from(thumb),
+            "carpalproximalinterphalangeal" => 2,
+            "carpalinterphalangeal" | "carpaldistalinterphalangeal" => 3,
+            _ => return None,
         };
         Some((finger, segment))
     }
@@ -164,6 +181,9 @@ mod tests {
             ("leftThumbProximal", Some((0, 2))),
             ("rightMiddleDistal", Some((2, 3))),
             ("rthumb", Some((0, 1))),
+            ("l_carpal_proximal_interphalangeal_2", Some((1, 2))),
+            ("r_carpal_interphalangeal_1", Some((0, 3))),
+            ("l_metatarsophalangeal_2", None),
             ("LFingers", None),
             ("Spine1", None),
         ];

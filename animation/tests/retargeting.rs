@@ -9,7 +9,7 @@ use toile_animation::{
     bvh::{self, Channel},
     retarget, shipped_walk,
 };
-use toile_character::{BodyModel, JOINT_COUNT, Joint, Pose, Skeleton};
+use toile_character::{BodyModel, JOINT_COUNT, Joint, JointNaming, Pose, Skeleton};
 
 const LIMBS: [(Joint, Joint); 8] = [
     (Joint::LeftUpperArm, Joint::LeftLowerArm),
@@ -72,6 +72,21 @@ fn the_file_may_have_z_up_and_face_anywhere() {
         Rotation3::from_axis_angle(&Vector3::y_axis(), std::f64::consts::FRAC_PI_2),
     ] {
         assert_same(&turned(&shipped_walk().unwrap(), &UnitQuaternion::from(turn)), &format!("{turn}"));
+    }
+}
+
+#[test]
+fn names_that_we_write_are_names_that_we_read() {
+    let walk = shipped_walk().unwrap();
+    let known = carried(&walk).report.joints;
+    for naming in JointNaming::ALL {
+        let mut renamed = walk.clone();
+        for joint in &mut renamed.joints {
+            if let Some((ours, _)) = known.iter().find(|(_, name)| *name == joint.name) {
+                joint.name = naming.name(*ours);
+            }
+        }
+        assert_same(&renamed, &format!("{naming:?}"));
     }
 }
 

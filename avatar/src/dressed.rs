@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use toile_character::{JOINT_COUNT, Motion, Pose, Skeleton, SkinWeights, skinning};
+use toile_character::{JOINT_COUNT, JointNaming, Motion, Pose, Skeleton, SkinWeights, skinning};
 use toile_geometry::Mesh;
 
 use crate::AvatarError;
@@ -14,6 +14,8 @@ pub struct Avatar {
     pub name: String,
     /// Joints of the person in the A-pose rest.
     pub skeleton: Skeleton,
+    /// How the joints are called in a GLB file.
+    pub joint_names: JointNaming,
     /// The pose that the layers are in, relative to that rest: for an avatar from scans, the pose of scan 0.
     pub pose0: Pose,
     /// The layers, inside to outside.

@@ -10,7 +10,7 @@ const GENERATOR: &str = concat!("Toile ", env!("CARGO_PKG_VERSION"));
 /// The avatar as a GLB file.
 ///
 /// One mesh node a layer, named as the layer, positions exactly as in the avatar's meshes (metres, +Y up); one
-/// skin of 52 joint nodes with VRM's names that rest in `pose0`; one animation a motion. The same avatar gives the
+/// skin of 52 joint nodes, by default with VRM's names, that rest in `pose0`; one animation a motion. The same avatar gives the
 /// same bytes. A single layer makes a rigged scan.
 ///
 /// # Errors
@@ -30,7 +30,7 @@ pub fn write_glb(avatar: &Avatar) -> Result<Vec<u8>, AvatarError> {
 
 /// Everything but animations and extensions: joint nodes first, then a mesh node a layer.
 pub(crate) fn document(avatar: &Avatar, rig: &Rig, buffer: &mut Buffer) -> Map<String, Value> {
-    let mut nodes = rig.nodes();
+    let mut nodes = rig.nodes(avatar.joint_names);
     let first_mesh_node = nodes.len();
     let mut meshes = Vec::new();
     for (index, layer) in avatar.layers.iter().enumerate() {

@@ -7,7 +7,7 @@
 //! ```
 //! use nalgebra::Point3;
 //! use toile_avatar::{Avatar, AvatarLayer, write_glb};
-//! use toile_character::{JOINT_COUNT, Pose, Skeleton, SkinWeights};
+//! use toile_character::{JOINT_COUNT, JointNaming, Pose, Skeleton, SkinWeights};
 //! use toile_geometry::Mesh;
 //!
 //! let corners = [[0.0, 1.0, 0.0], [0.1, 1.0, 0.0], [0.0, 1.1, 0.0]].map(Point3::from);
@@ -16,6 +16,7 @@
 //! let avatar = Avatar {
 //!     name: "alder".into(),
 //!     skeleton: Skeleton { rest: [Point3::new(0.0, 1.0, 0.0); JOINT_COUNT] },
+//!     joint_names: JointNaming::Vrm,
 //!     pose0: Pose::identity(),
 //!     layers: vec![AvatarLayer {
 //!         name: "body".into(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use serde_json::{Map, Value, json};
-use toile_character::{JOINT_COUNT, Joint, JointLimit, Pose, Skeleton, joint::JOINTS, joint_limits};
+use toile_character::{JOINT_COUNT, Joint, JointLimit, JointNaming, Pose, Skeleton, joint::JOINTS, joint_limits};
 
 use crate::buffer::{Buffer, Shape, Target};
 
@@ -34,15 +34,15 @@ impl Rig {
     }
 
     /// The 52 nodes in joint order.
-    pub fn nodes(&self) -> Vec<Value> {
-        JOINTS.iter().map(|&joint| self.node(joint)).collect()
+    pub fn nodes(&self, naming: JointNaming) -> Vec<Value> {
+        JOINTS.iter().map(|&joint| self.node(joint, naming)).collect()
     }
 
-    fn node(&self, joint: Joint) -> Value {
+    fn node(&self, joint: Joint, naming: JointNaming) -> Value {
         let local = self.local(joint);
         let children: Vec<usize> = JOINTS.iter().filter(|c| c.parent() == Some(joint)).map(|c| c.index()).collect();
         let mut node = Map::new();
-        node.insert("name".into(), json!(joint.name()));
+        node.insert("name".into(), json!(naming.name(joint)));
         node.insert("translation".into(), json!(local.translation.vector.as_slice()));
         if local.rotation.angle() > 0.0 {
             // In f64 a product of unit quaternions can exceed 1 in the last digit, which the format forbids.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
-use toile_character::{Joint, dress_pose::t_pose, joint::JOINTS};
+use toile_character::{Joint, JointNaming, dress_pose::t_pose, joint::JOINTS};
 
 use crate::{
     Avatar, AvatarError,
@@ -87,7 +87,7 @@ pub fn write_vrm(avatar: &Avatar, meta: &VrmMeta) -> Result<Vec<u8>, AvatarError
     if meta.authors.is_empty() || meta.authors.iter().any(|a| a.trim().is_empty()) {
         return Err(AvatarError::Avatar("a VRM file names at least one author".into()));
     }
-    let baked = avatar.in_pose(&t_pose(&avatar.skeleton))?;
+    let baked = Avatar { joint_names: JointNaming::Vrm, ..avatar.in_pose(&t_pose(&avatar.skeleton))? };
     let rig = Rig::unturned(&baked.skeleton, &baked.pose0);
     let mut buffer = Buffer::default();
     let mut document = document(&baked, &rig, &mut buffer);

@@ -91,9 +91,9 @@ pub fn fit_body(
     progress(0.45);
     let fine = refine(model, &scan, &trust, settings, state)?;
     progress(0.7);
-    let by_hand = mended(model, &settings.landmarks, &mend)?;
     let posed = model.posed(&fine.state.beta, &fine.state.pose);
     let bvh = Bvh::new(&scan.positions, &scan.triangles);
+    let by_hand = mended(model, settings, &mend, &bvh)?;
     let landmarks = landmarks(model, &posed, &scan, &bvh, &trust, &by_hand);
     let conformed = conform(model, &fine.state, &scan, &bvh, &trust, settings, &landmarks)?;
     progress(0.95);

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use toile_character::{BodyModel, Region, SkinWeights};
 use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals};
 
-use crate::{FittingError, Mend, settings::HandLandmarks};
+use crate::{FitSettings, FittingError, Mend, settings::HandLandmarks};
 
 /// Radius of the surroundings that are slid over the scan, metres.
 const PATCH: f32 = 0.045;
@@ -23,6 +23,9 @@ const INDEPENDENT: f64 = 10.0;
 const STEPS: usize = 4;
 /// A landmark that slid farther than this was not found, metres.
 const FARTHEST: f64 = 0.012;
+/// Farthest from the scan that a landmark may be set, metres: on skin, and under clothes.
+const OFF_SCAN: f32 = 0.03;
+const UNDER_CLOTHES: f32 = 0.15;
 /// Most points of a patch.
 const MOST: usize = 120;
 
@@ -67,11 +70,17 @@ pub(crate) fn landmarks(
     model.landmarks.par_iter().map(one).collect()
 }
 
-/// The landmarks set by hand, brought to the mended scan's frame.
+/// The landmarks set by hand, brought to the frame of the mended scan, whose triangles `bvh` has.
 ///
 /// # Errors
-/// [`FittingError::Setting`] names a landmark that the model does not have, or one that is no point.
-pub(crate) fn mended(model: &BodyModel, by_hand: &HandLandmarks, mend: &Mend) -> Result<HandLandmarks, FittingError> {
+/// [`FittingError::Setting`] names a landmark that the model does not have, one that is no point, or one far off the scan.
+pub(crate) fn mended(
+    model: &BodyModel,
+    settings: &FitSettings,
+    mend: &Mend,
+    bvh: &Bvh,
+) -> Result<HandLandmarks, FittingError> {
+    let farthest = if settings.dressed { UNDER_CLOTHES } else { OFF_SCAN };
     let bad = |reason| FittingError::Setting { name: "landmarks", reason };
     let one = |(name, p): (&String, &[f64; 3])| {
         if model.landmark(name).is_none() {
@@ -81,9 +90,16 @@ pub(crate) fn mended(model: &BodyModel, by_hand: &HandLandmarks, mend: &Mend) ->
         if !p.iter().all(|x| x.is_finite()) {
             return Err(bad(format!("{name} is not finite")));
         }
-        Ok((name.clone(), (mend.rotation * (Point3::from(*p) * mend.scale)).into()))
+        let point = mend.rotation * (Point3::from(*p) * mend.scale);
+        if bvh.closest(&point.cast(), farthest).is_none() {
+            let limit = 1e3 * farthest;
+            return Err(bad(format!(
+                "{name} is more than {limit:.0} mm from the scan; is it in the scan's own frame?"
+            )));
+        }
+        Ok((name.clone(), point.into()))
     };
-    by_hand.iter().map(one).collect()
+    settings.landmarks.iter().map(one).collect()
 }
 
 fn is_hand(region: Region) -> bool {

@@ -63,9 +63,9 @@ pub struct ConformSettings {
     /// Length over which the bending energy smooths the displacement, metres: detail much finer than six times
     /// this is left out. Default 0.006.
     pub stiffness_length: f64,
-    /// The same for hands and feet, which must stay well-formed, metres. Default 0.009.
+    /// The same for hands and feet, which must stay well-formed, metres. Default 0.015.
     pub extremity_length: f64,
-    /// The same for the head, metres. Default 0.006.
+    /// The same for the head, metres. Default 0.008.
     pub head_length: f64,
     /// Smallest cosine between the normals of body and scan; half of it on head and feet. Default 0.6.
     pub min_cos: f64,

@@ -22,7 +22,7 @@ pub struct SettledBody {
 pub struct SettleReport {
     /// Largest turn of an arm's joint or wrist, degrees.
     pub hand_turn_deg: f64,
-    /// Part of the body's vertices that were moved by more than half a millimetre, 0–1.
+    /// Part of the body's outer vertices that were moved by more than half a millimetre, 0–1.
     pub moved: f64,
     /// Farthest that one was moved, millimetres.
     pub moved_most_mm: f64,
@@ -51,7 +51,8 @@ pub fn settle_under(
     let turned = fit_hands_again(model, body, &scan, &trust, pose)?;
     let posed = body.posed(&turned);
     let points = contained(model, &posed, &scan, &trust);
-    let moves: Vec<f32> = posed.iter().zip(&points).map(|(a, b)| (a - b).norm()).collect();
+    let outer = (0..points.len()).filter(|&v| !model.inner[v]);
+    let moves: Vec<f32> = outer.map(|v| (posed[v] - points[v]).norm()).collect();
     let report = SettleReport {
         hand_turn_deg: largest_turn(pose, &turned),
         moved: moves.iter().filter(|m| **m > 0.0005).count() as f64 / moves.len().max(1) as f64,

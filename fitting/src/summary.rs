@@ -22,6 +22,8 @@ pub struct BodySummary {
     pub joints: BTreeMap<&'static str, [f64; 3]>,
     /// Shape coefficients in standard deviations.
     pub beta: Vec<f64>,
+    /// Joints of the body at rest (A-pose) by VRM name, metres.
+    pub rest_joints: BTreeMap<&'static str, [f64; 3]>,
     /// Joint angles.
     pub theta: Theta,
     /// Landmarks on the scan, in its frame.
@@ -59,6 +61,7 @@ impl BodyFit {
             volume_m3: m.volume_m3,
             joints: self.joints(),
             beta: self.beta.clone(),
+            rest_joints: JOINTS.iter().map(|&j| (j.name(), self.skeleton.position(j).into())).collect(),
             theta: Theta {
                 translation: self.pose.translation.into(),
                 rotations: JOINTS.iter().map(|&j| (j.name(), self.pose.rotation(j).scaled_axis().into())).collect(),

@@ -23,7 +23,7 @@ pub enum MeasureKind {
     Height,
     /// A taut tape around.
     Girth,
-    /// A taut tape over the surface.
+    /// A taut tape over the surface of the trunk and the leg; along an arm straight from point to point.
     Length,
     /// Straight, between two points.
     Breadth,
@@ -71,7 +71,7 @@ pub struct MeasureTable {
 const LEAST_HEIGHT: f64 = 0.3;
 
 /// Landmarks: the standard's term and the template's name.
-const LANDMARKS: [(&str, &str); 27] = [
+const LANDMARKS: [(&str, &str); 30] = [
     ("top of the head", "vertex"),
     ("chin point", "chin"),
     ("forehead point", "glabella"),
@@ -99,6 +99,9 @@ const LANDMARKS: [(&str, &str); 27] = [
     ("left ankle point", "leftAnkleOuter"),
     ("right ankle point", "rightAnkleOuter"),
     ("left heel point", "leftHeel"),
+    ("right heel point", "rightHeel"),
+    ("left foot point", "leftToeTip"),
+    ("right foot point", "rightToeTip"),
 ];
 
 /// Measures a body (its own shape at rest, template topology of `model`); `basic` are its stature, girths and volume as
@@ -153,14 +156,17 @@ impl MeasureTable {
         self.measures.iter().find(|m| m.name == name).map(|m| m.value_m)
     }
 
-    /// As comma-separated lines: name, kind, centimetres; the volume in litres last.
+    /// As comma-separated lines: name, kind, centimetres, and the height of the tape's middle above the soles,
+    /// centimetres; the volume in litres last.
     pub fn csv(&self) -> String {
-        let mut out = String::from("measurement,kind,value,unit\n");
+        let mut out = String::from("measurement,kind,value,unit,height\n");
         for m in &self.measures {
             let kind = format!("{:?}", m.kind).to_lowercase();
-            out += &format!("{},{kind},{:.1},cm\n", m.name, 100.0 * m.value_m);
+            let (low, high) = m.path.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[1]), h.max(p[1])));
+            let height = if m.path.is_empty() { String::new() } else { format!("{:.1}", 50.0 * (low + high)) };
+            out += &format!("{},{kind},{:.1},cm,{height}\n", m.name, 100.0 * m.value_m);
         }
-        out + &format!("volume,volume,{:.2},l\n", self.volume_l)
+        out + &format!("volume,volume,{:.2},l,\n", self.volume_l)
     }
 }
 

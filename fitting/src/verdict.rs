@@ -159,17 +159,39 @@ impl FitReport {
             format!("hardly seen and therefore estimated: {}", large.join(", ")),
         );
         let (mean, limit) = (self.scan_to_model.mean_mm, if self.estimated { 40.0 } else { 8.0 });
-        find(mean > limit, mean > 2.5 * limit, format!("the model lies {mean:.1} mm from the scan on average"));
+        find(
+            mean > limit,
+            mean > 2.5 * limit,
+            format!(
+                "the model lies {mean:.1} mm from the scan on average: are clothes, hair or things held in the way?"
+            ),
+        );
         let mean = self.scan_to_body.mean_mm;
         let loose = mean > LOOSE_MM && !self.estimated;
-        find(loose, false, format!("the body's own surface lies {mean:.1} mm from the scan on average"));
+        find(
+            loose,
+            false,
+            format!(
+                "the body's own surface lies {mean:.1} mm from the scan on average: look whether it stands in the scan"
+            ),
+        );
         let dressed = "the person is dressed: shape and measures are estimated".to_owned();
         find(self.estimated, false, dressed);
         let stature = measurements.stature_m;
         let human = (1.2..=2.2).contains(&stature);
-        find(!human, !(0.6..=2.5).contains(&stature), format!("the body would stand {stature:.2} m tall"));
+        find(
+            !human,
+            !(0.6..=2.5).contains(&stature),
+            format!("the body would stand {stature:.2} m tall: is it a whole person, and is the scan in metres?"),
+        );
         let rms = self.shape_rms;
-        find(rms > UNUSUAL, rms > 3.0, format!("the shape is {rms:.1} times as unusual as an ordinary body's"));
+        find(
+            rms > UNUSUAL,
+            rms > 3.0,
+            format!(
+                "the shape is {rms:.1} times as unusual as an ordinary body's: is there one person in it, and nothing else?"
+            ),
+        );
         // each doubt alone may have a reason; many together have one: the fit is wrong
         let many = if self.estimated { 4 } else { 3 };
         self.verdict = if self.reasons.len() >= many { Verdict::Failed } else { worst };

@@ -21,7 +21,7 @@ pub mod stack;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use toile_character::BodyModel;
+use toile_character::{BodyModel, JointNaming};
 use toile_fusion::FusionSettings;
 use toile_garments::CullSettings;
 
@@ -51,6 +51,8 @@ pub struct Options {
     pub motion: Option<PathBuf>,
     /// How takes are fused.
     pub fusion: FusionSettings,
+    /// What the joints are called in `avatar.glb`.
+    pub joint_names: JointNaming,
     /// Stop after this layer; without, all of them.
     pub last_layer: Option<String>,
     /// Leave out of the avatar what clothes hide; without, it is whole.
@@ -129,8 +131,7 @@ fn dress(
     }
     summary.add("layers", "stack", stack::run(run, &body)?);
     if goal >= Goal::Avatar {
-        let record = deliverables::run(run, &body, options.motion.as_deref(), options.cull.as_ref())?;
-        summary.add("avatar", "export", record);
+        summary.add("avatar", "export", deliverables::run(run, &body, options)?);
     }
     if goal >= Goal::Report {
         page::run(run, &body, options.motion.as_deref(), summary)?;

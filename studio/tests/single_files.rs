@@ -4,11 +4,15 @@
 
 mod common;
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use common::{exits, toile};
+use serde::Deserialize;
 use serde_json::Value;
-use toile_character::BodyModel;
+use toile_character::{BodyModel, Joint, JointRegressor};
 use toile_geometry::{Mesh, obj, ply};
 
 /// A folder of the private test data; `None`, with a word, where it is missing.
@@ -40,6 +44,67 @@ fn a_scan_in_millimetres_is_fitted_with_a_notice() {
     assert!((found - f64::from(stature)).abs() < 0.01, "{found} m, not {stature} m");
     for file in ["body.ply", "model.ply", "rest.ply", "rigged_scan.glb", "pose.json", "report.json"] {
         assert!(out.join(file).is_file(), "{file}");
+    }
+}
+
+/// The model's own mean body as somebody's scan.
+fn somebody(folder: &Path) -> PathBuf {
+    let model = BodyModel::load_default().unwrap();
+    let scan = folder.join("somebody.ply");
+    ply::write(&scan, &Mesh::new(model.mean.clone(), model.triangles)).unwrap();
+    scan
+}
+
+#[test]
+fn a_scan_is_measured_into_a_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scan, out) = (somebody(dir.path()), dir.path().join("measured"));
+    let answer = exits(0, toile().arg("measure").arg("--scan").arg(&scan).arg("--out").arg(&out));
+    let waist = answer["results"]["measurements_m"]["waist girth"].as_f64().unwrap();
+    let csv = fs::read_to_string(out.join("measurements.csv")).unwrap();
+    assert!(csv.starts_with("measurement,kind,value,unit,height\n"), "{csv}");
+    let line: Vec<&str> = csv.lines().find(|l| l.starts_with("waist girth")).unwrap().split(',').collect();
+    assert_eq!((line[1], line[3]), ("girth", "cm"));
+    assert!((line[2].parse::<f64>().unwrap() - 100.0 * waist).abs() < 0.06, "{line:?}");
+    assert!((80.0..130.0).contains(&line[4].parse::<f64>().unwrap()), "{line:?}");
+}
+
+#[test]
+fn what_is_said_by_hand_of_a_body_is_heeded() {
+    let dir = tempfile::tempdir().unwrap();
+    let (scan, out, edits) = (somebody(dir.path()), dir.path().join("fitted"), dir.path().join("body.json"));
+    let mut fit = || {
+        let mut command = toile();
+        command.arg("fit").arg("--scan").arg(&scan).arg("--out").arg(&out).arg("--edits").arg(&edits);
+        command
+    };
+    let model = BodyModel::load_default().unwrap();
+    let navel = model.mean[model.landmark("navel").unwrap() as usize];
+    let goal = [f64::from(navel.x), f64::from(navel.y) + 0.01, f64::from(navel.z) + 0.005];
+    let said = serde_json::json!({
+        "version": 1, "dressed": true, "components": 15, "joints": "mean-value", "landmarks": { "navel": goal }
+    });
+    fs::write(&edits, said.to_string()).unwrap();
+    let answer = exits(0, &mut fit());
+    assert!(answer["warnings"].to_string().contains("dressed"), "{answer}");
+    let body = json(out.join("body.json"));
+    assert_eq!(body["beta"].as_array().map(Vec::len), Some(15));
+    assert_eq!(body["report"]["estimated"], true);
+    let skin = ply::read(&out.join("body.ply")).unwrap().positions[model.landmark("navel").unwrap() as usize];
+    assert!((skin.z - goal[2] as f32).abs() < 0.002 && (skin.y - goal[1] as f32).abs() < 0.002, "{skin}");
+    let joint = |name: &str| Vec::<f64>::deserialize(&body["rest_joints"][name]).unwrap();
+    let beta = Vec::<f64>::deserialize(&body["beta"]).unwrap();
+    let expected = model.skeleton_by(&beta, JointRegressor::MeanValue).position(Joint::LeftHand);
+    assert!((joint("leftHand")[0] - expected.x).abs() < 1e-6, "{:?}, not {expected}", joint("leftHand"));
+    for (text, says) in [
+        (r#"{"version": 1, "landmarks": {"navel": [0, 3, 0]}}"#, "navel is more than 30 mm"),
+        (r#"{"version": 1, "landmarks": {"nabel": [0, 1, 0]}}"#, "no nabel"),
+        (r#"{"version": 1, "joint": "affine"}"#, "joint"),
+        (r#"{"version": 2}"#, "version 2"),
+    ] {
+        fs::write(&edits, text).unwrap();
+        let answer = exits(1, &mut fit());
+        assert!(answer["error"]["message"].as_str().unwrap().contains(says), "{answer}");
     }
 }
 

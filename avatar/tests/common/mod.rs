@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use toile_avatar::{Avatar, AvatarLayer};
-use toile_character::{BodyModel, Joint, Motion, Pose, SkinWeights};
+use toile_character::{BodyModel, Joint, JointNaming, Motion, Pose, SkinWeights};
 
 /// The avatar: 3 layers, one motion of 9 poses called `wave`.
 pub fn dressed() -> Avatar {
@@ -29,7 +29,14 @@ pub fn dressed() -> Avatar {
         (garment.garment, garment.thickness) = (Some(name[3..].into()), Some(0.0015));
         layers.push(garment);
     }
-    Avatar { name: "tester".into(), skeleton: body.skeleton, pose0, layers, motions: vec![wave()] }
+    Avatar {
+        name: "tester".into(),
+        skeleton: body.skeleton,
+        joint_names: JointNaming::Vrm,
+        pose0,
+        layers,
+        motions: vec![wave()],
+    }
 }
 
 fn layer(name: &str, mesh: toile_geometry::Mesh, weights: SkinWeights, order: u32) -> AvatarLayer {

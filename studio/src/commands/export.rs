@@ -7,6 +7,7 @@ use std::{
 
 use serde_json::{Value, json};
 use toile_capture::{Replay, export_standard};
+use toile_character::JointNaming;
 use toile_garments::CullSettings;
 
 use crate::{
@@ -30,6 +31,7 @@ Examples:
   toile export anna --motion dance.bvh
   toile export anna --glb anna-today.glb
   toile export anna --cull-hidden --cull-margin 50
+  toile export anna --joint-names mixamo --glb for-unity.glb
   toile export anna/takes/00-body.mcap --mcap plain.mcap";
 
 /// Write the avatar: GLB with a motion, VRM; or a take in a plain encoding
@@ -41,6 +43,10 @@ pub struct Export {
     /// BVH motion for the avatar (without: a walk that ships with Toile)
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
+    /// What the joints are called in avatar.glb: as VRM names its bones, by H-Anim, or as Mixamo does, which other
+    /// programs map by themselves
+    #[arg(long, value_enum, default_value_t = Names::Vrm)]
+    joint_names: Names,
     /// Put a copy of the GLB here
     #[arg(long, value_name = "FILE")]
     glb: Option<PathBuf>,
@@ -54,8 +60,26 @@ pub struct Export {
     #[arg(long, value_name = "MM", requires = "cull_hidden")]
     cull_margin: Option<f32>,
     /// Convert a recording: depth as plain 16-bit images (16UC1), which other viewers display
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "glb", "vrm", "cull_hidden"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "joint_names", "glb", "vrm", "cull_hidden"])]
     mcap: Option<PathBuf>,
+}
+
+/// A system of joint names on the command line.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Names {
+    Vrm,
+    Hanim,
+    Mixamo,
+}
+
+impl From<Names> for JointNaming {
+    fn from(names: Names) -> Self {
+        match names {
+            Names::Vrm => Self::Vrm,
+            Names::Hanim => Self::HAnim,
+            Names::Mixamo => Self::Mixamo,
+        }
+    }
 }
 
 impl Export {
@@ -68,7 +92,8 @@ impl Export {
         if let Some(plain) = &self.mcap {
             return convert(&self.path, plain);
         }
-        let options = Options { motion: self.motion.clone(), cull: self.cull()?, ..Options::default() };
+        let (cull, joint_names) = (self.cull()?, self.joint_names.into());
+        let options = Options { motion: self.motion.clone(), cull, joint_names, ..Options::default() };
         options.check()?;
         let mut answer = reach(&self.path, Goal::Avatar, &options, session)?;
         for (copy, name) in [(&self.glb, "avatar.glb"), (&self.vrm, "avatar.vrm")] {

@@ -44,9 +44,9 @@ pub struct Person {
     /// The person in the scan is dressed: the body under the clothes is estimated
     #[arg(long, requires = "scan")]
     pub dressed: bool,
-    /// Landmarks set by hand on the scan: JSON, as in docs/edits.md
-    #[arg(long, value_name = "FILE", requires = "scan")]
-    pub landmarks: Option<PathBuf>,
+    /// What is said by hand: landmarks on the scan, shape components, joints: JSON, as in docs/edits.md
+    #[arg(long, value_name = "FILE", requires = "scan", alias = "landmarks")]
+    pub edits: Option<PathBuf>,
 }
 
 impl Person {
@@ -62,7 +62,7 @@ impl Person {
                 Ok((answer, Folders::new(subject).body()))
             }
             (None, Some(scan), Some(out)) => {
-                let mut edits = self.landmarks.as_deref().map(BodyEdits::read).transpose()?.unwrap_or_default();
+                let mut edits = self.edits.as_deref().map(BodyEdits::read).transpose()?.unwrap_or_default();
                 edits.dressed |= self.dressed;
                 Ok((fit_scan(scan, out, edits, session)?, out.clone()))
             }

@@ -9,6 +9,8 @@ use crate::{StudioError, commands::fit::Person, outcome::Answer, pipeline::body_
 
 const AFTER: &str = "\
 Girths as a taut tape lies, heights above the soles, standing straight. Fits the body first where that is missing.
+measurements.csv has a line a measurement: name, kind, value, unit, height of the tape's middle above the soles (cm);
+measurements.json also has where each tape lies, and the landmarks.
 
 Examples:
   toile measure anna

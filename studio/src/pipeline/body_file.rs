@@ -1,9 +1,13 @@
 //! The fitted body between runs: `body.json`, `rest.ply` and the pose files, back as a skinned mesh.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
+use nalgebra::Point3;
 use serde::{Deserialize, de::DeserializeOwned};
-use toile_character::{BodyModel, Pose, SkinnedMesh, joint::JOINT_COUNT};
+use toile_character::{
+    BodyModel, Pose, Skeleton, SkinnedMesh,
+    joint::{JOINT_COUNT, JOINTS},
+};
 use toile_geometry::ply;
 
 use crate::{StudioError, pipeline::folders::Folders, stage};
@@ -11,8 +15,8 @@ use crate::{StudioError, pipeline::folders::Folders, stage};
 /// What later stages need of `body.json`.
 #[derive(Debug, Clone, Deserialize)]
 struct Shape {
-    /// Shape coefficients, in standard deviations.
-    beta: Vec<f64>,
+    /// Joints at rest by VRM name, metres.
+    rest_joints: BTreeMap<String, [f64; 3]>,
 }
 
 /// The fitted body.
@@ -21,8 +25,6 @@ pub struct Body {
     pub skinned: SkinnedMesh,
     /// Its pose in scan 0.
     pub pose0: Pose,
-    /// Shape coefficients, in standard deviations.
-    pub beta: Vec<f64>,
 }
 
 impl Body {
@@ -31,12 +33,24 @@ impl Body {
     /// # Errors
     /// [`StudioError`] where a file is missing or not what it should be.
     pub fn load(folders: &Folders, layer: &str, model: &BodyModel) -> Result<Self, StudioError> {
-        let Shape { beta } = read_json(&folders.body_json())?;
+        let path = folders.body_json();
+        let skeleton = skeleton(&path, &read_json(&path)?)?;
         let mut mesh = ply::read(&folders.body_rest())?;
         mesh.recompute_normals();
-        let skinned = SkinnedMesh::new(mesh, model.skeleton_at(&beta), model.weights.clone())?;
-        Ok(Self { skinned, pose0: read_pose(&folders.pose(layer))?, beta })
+        let skinned = SkinnedMesh::new(mesh, skeleton, model.weights.clone())?;
+        Ok(Self { skinned, pose0: read_pose(&folders.pose(layer))? })
     }
+}
+
+/// The joints as the fit left them, whatever way it found them by.
+fn skeleton(path: &Path, shape: &Shape) -> Result<Skeleton, StudioError> {
+    let mut rest = [Point3::origin(); JOINT_COUNT];
+    for joint in JOINTS {
+        let found = shape.rest_joints.get(joint.name());
+        let lacks = || StudioError::format(path, format!("has no {}; delete it and run again", joint.name()));
+        rest[joint.index()] = found.copied().map(Point3::from).ok_or_else(lacks)?;
+    }
+    Ok(Skeleton { rest })
 }
 
 /// Reads a pose file.

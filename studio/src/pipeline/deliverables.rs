@@ -8,14 +8,14 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::{Value, json};
 use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, write_glb, write_vrm};
-use toile_character::{Pose, Skeleton, SkinWeights};
+use toile_character::{JointNaming, Pose, Skeleton, SkinWeights};
 use toile_garments::{CullSettings, GarmentError, Worn, hidden_triangles};
 use toile_geometry::Mesh;
 
 use crate::{
     StudioError,
     pipeline::{
-        Run,
+        Options, Run,
         body_file::Body,
         garment::{garment_type, thickness},
         motion,
@@ -29,19 +29,23 @@ const VERSION: u32 = 3;
 /// Expected seconds.
 pub const COST: f64 = 0.5;
 
-/// Writes the avatar's files, unless they are up to date. `bvh` is the motion; without it, the shipped walk. With `cull`,
-/// triangles that clothes hide are left out and counted.
+/// Writes the avatar's files with the motion and joint names that `options` choose, unless they are up to date; where
+/// they say so without the triangles that clothes hide, which are counted.
 ///
 /// # Errors
 /// [`StudioError`] where the motion cannot be used or files cannot be read or written.
-pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, cull: Option<&CullSettings>) -> Result<Record, StudioError> {
+pub fn run(run: &Run, body: &Body, options: &Options) -> Result<Record, StudioError> {
+    let Options { motion: bvh, cull, joint_names, .. } = options;
+    let (bvh, cull) = (bvh.as_deref(), cull.as_ref());
     let folders = &run.folders;
     let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
     inputs.extend(run.garments().map(|l| folders.garment(l)));
     inputs.extend(bvh.map(Path::to_path_buf));
     let garments: Vec<Garment> = run.garment_numbers().map(|n| Garment::new(run, n)).collect::<Result<_, _>>()?;
-    let mut settings =
-        json!({ "name": run.title(), "garments": garments, "retarget": motion::settings(), "vrm": VrmMeta::default() });
+    let mut settings = json!({
+        "name": run.title(), "garments": garments, "joint_names": joint_names,
+        "retarget": motion::settings(), "vrm": VrmMeta::default(),
+    });
     if let Some(cull) = cull {
         settings["cull"] = plain(cull)?;
     }
@@ -66,6 +70,7 @@ pub fn run(run: &Run, body: &Body, bvh: Option<&Path>, cull: Option<&CullSetting
         }
         progress(0.3);
         avatar.motions.push(moved.motion);
+        avatar.joint_names = *joint_names;
         let wrong = |e: AvatarError| StudioError::stage(&folders.glb(), e);
         let glb = write_glb(&avatar).map_err(wrong)?;
         progress(0.6);
@@ -95,6 +100,7 @@ pub fn rigged_scan(
     let avatar = Avatar {
         name: "rigged scan".into(),
         skeleton: skeleton.clone(),
+        joint_names: JointNaming::Vrm,
         pose0: pose.clone(),
         layers: vec![layer],
         motions: Vec::new(),
@@ -134,7 +140,8 @@ fn dressed(run: &Run, body: &Body, garments: Vec<Garment>) -> Result<Avatar, Stu
         layers.push(AvatarLayer { name: layer.clone(), mesh, weights, order, garment, thickness });
     }
     let (skeleton, pose0) = (body.skinned.skeleton.clone(), body.pose0.clone());
-    Ok(Avatar { name: run.title().to_string(), skeleton, pose0, layers, motions: Vec::new() })
+    let (name, joint_names) = (run.title().to_string(), JointNaming::Vrm);
+    Ok(Avatar { name, skeleton, joint_names, pose0, layers, motions: Vec::new() })
 }
 
 /// Takes triangles that clothes hide off every layer, and vertices that none uses any more; a layer of which nothing is
@@ -182,7 +189,8 @@ mod tests {
         let body = sheet("body", 0, 0.0, 30);
         let skeleton = Skeleton { rest: [Point3::origin(); JOINT_COUNT] };
         let layers = vec![body.clone(), vest, coat.clone()];
-        let mut avatar = Avatar { name: "anna".into(), skeleton, pose0: Pose::identity(), layers, motions: Vec::new() };
+        let (name, joint_names, pose0) = ("anna".into(), JointNaming::Vrm, Pose::identity());
+        let mut avatar = Avatar { name, skeleton, joint_names, pose0, layers, motions: Vec::new() };
         let told = leave_out_hidden(&mut avatar, &CullSettings { margin: 0.03, reach: 0.1 }).unwrap();
         avatar.validate().unwrap();
         assert_eq!(avatar.layers.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["body", "02-coat"]);

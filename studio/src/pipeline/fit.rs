@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Translation3};
 use serde::Deserialize;
-use toile_character::BodyModel;
+use toile_character::{BodyModel, JointRegressor};
 use toile_fitting::{BodyFit, FitReport, FitSettings, HandLandmarks, Mend, Verdict, fit_body, measure_table, rig_scan};
 use toile_geometry::{Mesh, Rigid, color_transfer::closest_colors, ply};
 
@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Raised whenever the same scan and settings give another body.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
 
@@ -61,6 +61,12 @@ pub struct BodyEdits {
     /// Landmarks by the template's names: metres, in the frame of the first take's scan.
     #[serde(default)]
     pub landmarks: HandLandmarks,
+    /// Shape components used; without, the default of [`FitSettings`].
+    #[serde(default)]
+    pub components: Option<usize>,
+    /// How joints follow the shape.
+    #[serde(default)]
+    pub joints: JointRegressor,
 }
 
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -76,6 +82,17 @@ impl TryFrom<u32> for BodyEditsVersion {
 }
 
 impl BodyEdits {
+    fn settings(&self) -> FitSettings {
+        let defaults = FitSettings::default();
+        FitSettings {
+            dressed: self.dressed,
+            landmarks: self.landmarks.clone(),
+            components: self.components.unwrap_or(defaults.components),
+            joints: self.joints,
+            ..defaults
+        }
+    }
+
     /// Reads a file of edits.
     ///
     /// # Errors
@@ -109,8 +126,7 @@ pub fn run(run: &Run, model: &BodyModel) -> Result<Record, StudioError> {
 /// # Errors
 /// As [`run`].
 pub fn fit(run: &Run, place: &Place, model: &BodyModel) -> Result<Record, StudioError> {
-    let (dressed, landmarks) = (place.edits.dressed, place.edits.landmarks.clone());
-    let settings = FitSettings { dressed, landmarks, ..FitSettings::default() };
+    let settings = place.edits.settings();
     let at = |name: &str| place.folder.join(name);
     let stage = Stage {
         name: "fit",

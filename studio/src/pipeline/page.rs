@@ -81,13 +81,14 @@ fn contents(run: &Run, body: &Body, bvh: Option<&Path>, summary: &Summary) -> Re
     let moved = motion::load(bvh, &body.skinned.skeleton)?.motion;
     let table: MeasureTable = read_json(&folders.measurements())?;
     let found: Found = read_json(&folders.body_json())?;
+    let floor = body_mesh.bounds().map_or(0.0, |(low, _)| f64::from(low.y));
     Ok(Contents {
         name: run.title().to_string(),
         subtitle: run.subtitle(),
         takes: takes.iter().map(|l| take_row(l, summary)).collect(),
         measurements: measurement_rows(&table),
         tapes: table.measures.into_iter().map(|m| m.path).collect(),
-        sections: found.girths.into_iter().map(|(name, girth)| (name, girth.height_m)).collect(),
+        sections: found.girths.into_iter().map(|(name, girth)| (name, floor + girth.height_m)).collect(),
         landmarks: found.landmarks,
         standing: run.read_mesh(&folders.standing())?,
         warnings: summary.warnings.clone(),
@@ -110,7 +111,7 @@ struct Found {
     girths: BTreeMap<String, At>,
 }
 
-/// Height of a girth, metres.
+/// Height of a girth above the soles, metres.
 #[derive(Deserialize)]
 struct At {
     height_m: f64,

@@ -6,7 +6,7 @@
 use serde_json::json;
 use toile_character::BodyModel;
 use toile_fitting::{UnderFit, UnderSettings, Verdict, pose_under, rigged_scan, settle_under};
-use toile_geometry::{Mesh, ply};
+use toile_geometry::ply;
 
 use crate::{
     StudioError,
@@ -57,8 +57,7 @@ pub fn run(run: &Run, n: usize, body: &Body, model: &BodyModel) -> Result<Record
             let scan_before = run.read_mesh(&folders.scan(worn))?;
             let dressed = rigged_scan(&scan_before, &body.skinned, &read_pose(&folders.pose(worn))?);
             // limbs are drawn to how they were seen undressed: what clothes hide goes astray a little in each take
-            pose_under(&dressed, &trust(&scan_before), &habit, &scan, &settings, progress)
-                .map_err(|e| StudioError::stage(&scan_path, e))
+            pose_under(&dressed, &[], &habit, &scan, &settings, progress).map_err(|e| StudioError::stage(&scan_path, e))
         };
         let (mut worn_as, mut fit) = (n - 1, fit_as(&before[n - 1])?);
         for earlier in (0..n - 1).rev() {
@@ -87,14 +86,6 @@ pub fn run(run: &Run, n: usize, body: &Body, model: &BodyModel) -> Result<Record
             ..Product::default()
         })
     })
-}
-
-/// What fusion closed without seeing it does not tell where the person is.
-fn trust(scan: &Mesh) -> Vec<f32> {
-    match scan.attributes.get("filled") {
-        Some(filled) => filled.iter().map(|f| 1.0 - f.clamp(0.0, 1.0)).collect(),
-        None => vec![1.0; scan.positions.len()],
-    }
 }
 
 /// What to say of take `layer`, which is worn as the first of `since` was.
