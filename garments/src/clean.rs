@@ -23,6 +23,11 @@ const SURROUNDED: f64 = 0.95;
 const ALONG: f32 = 0.8;
 /// A membrane spans hollows: cloth that nobody saw is believed up to this height over what was worn before, metres.
 const NEAR: f32 = 0.05;
+/// A vertex between others is said to belong, or not to, from this share of [`BY_HAND`] on.
+const SAID: f32 = 0.3;
+
+/// Vertex attribute of what strokes decided: 1 where somebody said that it belongs, −1 that it does not.
+pub const BY_HAND: &str = "by_hand";
 
 /// Labels with small islands of either kind turned over, and of the garment's pieces only the large ones kept.
 /// Returns how many pieces are left.
@@ -101,7 +106,7 @@ pub fn close_hidden(mesh: &mut Mesh, garment: &[bool], bones: &[[Point3<f32>; 2]
     fill_where(mesh, |mesh, rim| belongs(rim) && !bones.iter().any(|b| passes(&mesh.positions, rim, b)))
 }
 
-/// The mesh without pieces smaller than `share` of its largest one (by area).
+/// The mesh without pieces smaller than `share` of its largest one (by area), but for those that strokes added.
 pub fn keep_large_pieces(mesh: &Mesh, share: f32) -> Mesh {
     let (set, count) = vertex_components(mesh.positions.len(), &mesh.triangles);
     let mut areas = vec![0.0f32; count];
@@ -110,7 +115,10 @@ pub fn keep_large_pieces(mesh: &Mesh, share: f32) -> Mesh {
         areas[set[tri[0] as usize] as usize] += 0.5 * (b - a).cross(&(c - a)).norm();
     }
     let largest = areas.iter().copied().fold(0.0, f32::max);
-    mesh.filter_triangles(|t| areas[set[mesh.triangles[t][0] as usize] as usize] >= share * largest).0
+    let mut kept: Vec<bool> = areas.iter().map(|a| *a >= share * largest).collect();
+    let by_hand = mesh.attributes.get(BY_HAND).map_or(&[][..], Vec::as_slice);
+    by_hand.iter().zip(&set).filter(|(said, _)| **said > SAID).for_each(|(_, s)| kept[*s as usize] = true);
+    mesh.filter_triangles(|t| kept[set[mesh.triangles[t][0] as usize] as usize]).0
 }
 
 /// The mesh without strips of a few triangles' width: threads that fusion spun across an opening. What lies within
@@ -145,12 +153,20 @@ pub fn cut_crumpled(mesh: &mut Mesh, depth: f32) -> bool {
     !crumpled.is_empty()
 }
 
-/// Closes boundary loops up to `longest` (metres) unless one of `bones` passes through them. New triangles are few;
+/// Closes boundary loops up to `longest` (metres) unless one of `bones` passes through them or strokes cut them. New triangles are few;
 /// remeshing refines them. Marks the rims of closed holes in the attribute `filled` and returns how many were closed.
 pub fn fill_holes(mesh: &mut Mesh, bones: &[[Point3<f32>; 2]], longest: f32) -> usize {
     fill_where(mesh, |mesh, rim| {
-        loop_length(&mesh.positions, rim) <= longest && !bones.iter().any(|b| passes(&mesh.positions, rim, b))
+        loop_length(&mesh.positions, rim) <= longest
+            && !bones.iter().any(|b| passes(&mesh.positions, rim, b))
+            && !is_cut_by_hand(mesh, rim)
     })
+}
+
+/// True where most of a rim was made by strokes.
+fn is_cut_by_hand(mesh: &Mesh, rim: &[u32]) -> bool {
+    let Some(by_hand) = mesh.attributes.get(BY_HAND) else { return false };
+    2 * rim.iter().filter(|&&v| by_hand[v as usize] < -SAID).count() > rim.len()
 }
 
 fn fill_where(mesh: &mut Mesh, wanted: impl Fn(&Mesh, &[u32]) -> bool) -> usize {

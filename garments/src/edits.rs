@@ -81,6 +81,8 @@ fn default_reach() -> f32 {
 pub struct Applied {
     /// True for vertices whose labels an edit may have changed.
     pub near: Vec<bool>,
+    /// 1 where a stroke says that the vertex belongs, −1 where it says that it does not, else 0.
+    pub painted: Vec<f32>,
     /// Signed distance from a hem line, metres, positive on the garment's side; NaN away from hem lines.
     pub hem_distance: Vec<f32>,
     /// Area whose label changed, square metres.
@@ -151,7 +153,12 @@ impl Edits {
     ) -> Applied {
         let before = labels.garment.clone();
         let count = graph.len();
-        let mut applied = Applied { near: vec![false; count], hem_distance: vec![f32::NAN; count], changed_m2: 0.0 };
+        let mut applied = Applied {
+            near: vec![false; count],
+            painted: vec![0.0; count],
+            hem_distance: vec![f32::NAN; count],
+            changed_m2: 0.0,
+        };
         for stroke in &self.strokes {
             stroke.apply(scan, graph, evidence, labels, settings, &mut applied);
         }
@@ -190,6 +197,9 @@ impl Stroke {
         labels::relabel(graph, evidence, &mut local, settings);
         for (v, &d) in distance.iter().enumerate().filter(|(_, d)| **d < far) {
             applied.near[v] = true;
+            if d <= self.radius {
+                applied.painted[v] = sign;
+            }
             labels.garment[v] = if d <= self.radius { belongs } else { local.garment[v] };
             labels.confidence[v] = if d <= self.radius { 1.0 } else { labels.confidence[v] };
         }

@@ -358,6 +358,7 @@ fn garment_mesh(
     if let Some(edits) = edits {
         follow_edits(edits, &mut field, [&mut unseen, &mut clearance], settings.hem_smoothing);
     }
+    let by_hand = edits.map(|edits| around_strokes(graph, edits));
     let mut scan = take.scan.clone();
     scan.normals.clear();
     scan.attributes.retain(|name, _| name == "filled");
@@ -365,6 +366,7 @@ fn garment_mesh(
     scan.attributes.insert("confidence".into(), labels.confidence.clone());
     scan.attributes.insert(FREE.into(), unseen);
     scan.attributes.insert(CLEARANCE.into(), clearance);
+    scan.attributes.extend(by_hand.map(|said| (clean::BY_HAND.into(), said)));
     let bones = bones(take);
     clean::close_hidden(&mut scan, &labels.garment, &bones);
     let mut mesh = cut::cut_positive(&scan, &field);
@@ -383,12 +385,23 @@ fn garment_mesh(
         clean::fill_holes(&mut mesh, &bones, settings.hole_rim);
         rim::smooth(&mut mesh, settings.rim_smoothing, LEAST_RIM);
     }
+    mesh.attributes.remove(clean::BY_HAND);
     mesh.recompute_normals();
     mesh
 }
 
-/// The field's zero line runs along hem lines; an edited rim stays where it was put.
+/// What strokes decided, [`clean::BY_HAND`], with a ring around what they took out: the rim that is left.
+fn around_strokes(graph: &ScanGraph, edits: &Applied) -> Vec<f32> {
+    let said = |v: usize| {
+        let is_beside = || graph.neighbors.of(v).iter().any(|&n| edits.painted[n as usize] < 0.0);
+        if edits.painted[v] == 0.0 && is_beside() { -1.0 } else { edits.painted[v] }
+    };
+    (0..graph.len()).map(said).collect()
+}
+
+/// The field's zero line runs around strokes and along hem lines; an edited rim stays where it was put.
 fn follow_edits(edits: &Applied, field: &mut [f32], lost: [&mut [f32]; 2], smoothing: f32) {
+    field.iter_mut().zip(&edits.painted).filter(|(_, said)| **said != 0.0).for_each(|(f, said)| *f = *said);
     for (f, d) in field.iter_mut().zip(&edits.hem_distance).filter(|(_, d)| d.is_finite()) {
         *f = (d / smoothing.max(1e-4)).clamp(-1.0, 1.0);
     }

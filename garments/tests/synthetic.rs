@@ -353,6 +353,30 @@ fn a_stroke_changes_its_neighbourhood_and_nothing_else() {
 }
 
 #[test]
+fn the_garments_mesh_shows_what_strokes_say() {
+    let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
+    let run = |edits: Option<&Edits>| {
+        let take = Take { edits, ..take(&person, &scan, &before, &pose) };
+        extract(&take, &ExtractSettings::default(), &|_| ()).unwrap().garment
+    };
+    let nearest =
+        |mesh: &Mesh, at: &Point3<f32>| Bvh::new(&mesh.positions, &mesh.triangles).closest(at, 1.0).unwrap().distance;
+    let loops = |mesh: &Mesh| boundary_loops(&mesh.triangles).len();
+    let plain = run(None);
+    // A hole in the middle is not closed again, nor smoothed away where it is small.
+    let inside = Point3::new(0.0, 0.55, RADIUS + 0.01);
+    for radius in [0.015, 0.008] {
+        let cut = run(Some(&stroke(Mark::DoesNotBelong, inside, radius)));
+        assert_eq!(loops(&cut), loops(&plain) + 1, "radius {radius}");
+        assert!(nearest(&cut, &inside) > 0.4 * radius, "radius {radius}: {}", nearest(&cut, &inside));
+    }
+    // A patch away from the rest stays.
+    let apart = Point3::new(0.0, 1.0, RADIUS);
+    assert!(nearest(&plain, &apart) > 0.1);
+    assert!(nearest(&run(Some(&stroke(Mark::Belongs, apart, 0.03))), &apart) < 0.003);
+}
+
+#[test]
 fn the_hem_follows_a_line() {
     let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
     let height = |a: f32| 0.785 + 0.01 * (2.0 * a).sin();

@@ -81,6 +81,7 @@ impl Edit {
             edits = read_edits(&path)?;
             edits.strokes.extend(strokes);
             edits.hems.extend(hems);
+            edits.check().map_err(|e| StudioError::format(file, format!("together with {}: {e}", path.display())))?;
         }
         disk::write_whole(&path, &pretty(&edits)?)
     }
