@@ -6,7 +6,7 @@ use toile_character::{Joint, Pose, Skeleton, SkinWeights, joint::JOINTS};
 use toile_geometry::{
     Mesh,
     bvh::Bvh,
-    remesh,
+    handles, remesh,
     topology::{boundary_loops, loop_length},
 };
 
@@ -372,6 +372,7 @@ fn garment_mesh(
     let mut mesh = cut::cut_positive(&scan, &field);
     mesh = clean::keep_large_pieces(&mesh, settings.piece_share);
     clean::fill_holes(&mut mesh, &bones, settings.hole_rim);
+    mesh = handles::cut_handles(&mesh, settings.hole_rim).0;
     let lost = lost_at_rims(&mut mesh, settings);
     rim::extend(&mut mesh, &lost);
     mesh = remesh::isotropic(&mesh, settings.edge_length);

@@ -38,6 +38,11 @@ pub struct Filled {
 /// ones 0), and colours and attributes that run on smoothly from the border. The mesh must be a manifold
 /// ([`crate::components::make_manifold`]). Normals are computed anew where there were any.
 pub fn fill_holes(mesh: &Mesh, max_length: f32) -> (Mesh, Filled) {
+    fill_where(mesh, |border| loop_length(&mesh.positions, border) <= max_length)
+}
+
+/// As [`fill_holes`], the holes whose border is `wanted`.
+pub(crate) fn fill_where(mesh: &Mesh, wanted: impl Fn(&[u32]) -> bool + Sync) -> (Mesh, Filled) {
     let mut out = mesh.clone();
     out.attributes.entry(FILLED.into()).or_insert_with(|| vec![0.0; mesh.positions.len()]);
     let loops: Vec<Vec<u32>> =
@@ -46,7 +51,7 @@ pub fn fill_holes(mesh: &Mesh, max_length: f32) -> (Mesh, Filled) {
     let around = VertexTriangles::new(mesh.positions.len(), &mesh.triangles);
     let mut filled = Filled::default();
     let patches: Vec<(Vec<u32>, Option<Patch>)> =
-        loops.par_iter().filter_map(|l| close(mesh, &around, l, &taken, max_length)).collect();
+        loops.par_iter().filter(|l| wanted(l)).map(|l| close(mesh, &around, l, &taken)).collect();
     for (border, patch) in patches {
         match patch {
             Some(patch) => {
@@ -63,18 +68,13 @@ pub fn fill_holes(mesh: &Mesh, max_length: f32) -> (Mesh, Filled) {
     (out, filled)
 }
 
-/// The border in the patch's direction and its patch, if there is one; `None` where the border is too long.
+/// The border in the patch's direction and its patch, if there is one.
 fn close(
     mesh: &Mesh,
     around: &VertexTriangles,
     border: &[u32],
     taken: &BTreeSet<(u32, u32)>,
-    max_length: f32,
-) -> Option<(Vec<u32>, Option<Patch>)> {
-    let length = loop_length(&mesh.positions, border);
-    if length > max_length {
-        return None;
-    }
+) -> (Vec<u32>, Option<Patch>) {
     // The patch's triangles run against the border's own direction.
     let reversed: Vec<u32> = border.iter().rev().copied().collect();
     let points: Vec<Point3<f64>> = reversed.iter().map(|&v| mesh.positions[v as usize].cast()).collect();
@@ -90,7 +90,7 @@ fn close(
         }
         patch
     });
-    Some((reversed, patch))
+    (reversed, patch)
 }
 
 /// Cuts a cycle that meets itself into simple ones.

@@ -28,6 +28,7 @@ pub mod color_transfer;
 pub mod components;
 pub mod decimate;
 pub mod error;
+pub mod handles;
 pub mod holes;
 pub mod intersection;
 pub mod max_flow;
