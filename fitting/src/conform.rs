@@ -341,7 +341,7 @@ mod tests {
             // The fitted arm hangs nearer to the trunk than the scan's, or in it.
             let (scan, start) = (Mesh::new(lowered(angle), model.triangles.clone()), lowered(angle + 0.08));
             let bvh = Bvh::new(&scan.positions, &scan.triangles);
-            let surface = Surface { scan: &scan, trust: &trust, bvh, settings: &settings };
+            let surface = Surface { scan: &scan, trust: &trust, bvh: &bvh, settings: &settings };
             let segments = Segments::new(&model, &rest, &start);
             let normals = vertex_normals(&start, &model.triangles);
             for v in (0..rest.len()).filter(is_arm) {
