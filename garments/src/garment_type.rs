@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     body_parts::{BodyPart, PART_COUNT},
-    extract::LEGS_APART,
+    guess::LEGS_APART,
 };
 
 /// What kind of garment a layer is.
