@@ -6,7 +6,7 @@
 use serde_json::json;
 use toile_character::{Pose, SkinWeights};
 use toile_garments::{
-    LayerReport, PosedReport, StackSettings, Worn, carry_weights, hanging::FREE_PART, posed_report, stack,
+    LayerReport, PosedReport, StackSettings, Worn, carry_weights, hanging::FREE_PART, posed::TORN, posed_report, stack,
 };
 use toile_geometry::{Mesh, ply};
 
@@ -61,7 +61,8 @@ pub fn run(run: &Run, body: &Body) -> Result<Record, StudioError> {
         let walking = walking(body, &body_mesh, &layers, &weights)?;
         let encoded = layers.iter().zip(&weights).map(|(mesh, w)| ply::encode(&with_weights(mesh, w)));
         let files = garments.iter().map(|l| folders.garment(l)).zip(encoded).collect();
-        let warnings = garments.iter().zip(&report.layers).filter_map(|(l, r)| warning(l, r)).collect();
+        let told = garments.iter().zip(&report.layers).zip(&walking);
+        let warnings = told.flat_map(|((l, report), walking)| warnings(l, report, walking)).collect();
         let free: Vec<Option<f32>> = layers.iter().map(free_share).collect();
         let result = json!({ "layers": plain(&report.layers)?, "walking": plain(&walking)?, "free_share": free });
         Ok(Product { files, result, warnings, ..Product::default() })
@@ -99,11 +100,15 @@ fn walking(
     Ok(posed_report(&worn, skeleton, &body.pose0, &poses).split_off(1))
 }
 
-fn warning(layer: &str, report: &LayerReport) -> Option<String> {
-    let (pairs, cut) = (report.crossing_pairs, report.cut_triangles);
-    match () {
-        () if pairs > 0 => Some(format!("{layer}: {pairs} pairs of triangles still cut through a layer below")),
-        () if cut > 0 => Some(format!("{layer}: {cut} triangles were cut out because they crossed a layer below")),
-        () => None,
-    }
+/// What is to be looked at: in the pose of the scans, and in the walk.
+fn warnings(layer: &str, report: &LayerReport, walking: &PosedReport) -> Vec<String> {
+    let (pairs, cut, [before, after]) = (report.crossing_pairs, report.cut_triangles, report.self_crossings);
+    let torn = walking.torn_most;
+    let told = [
+        (pairs > 0, format!("{pairs} pairs of triangles still cut through a layer below")),
+        (cut > 0, format!("{cut} triangles were cut out because they crossed a layer below")),
+        (after > before, format!("stacking left {after} pairs of its triangles crossing each other, {before} before")),
+        (torn > 0, format!("{torn} triangles stretch more than {TORN:.0} times in the walk")),
+    ];
+    told.into_iter().filter(|(is_so, _)| *is_so).map(|(_, what)| format!("{layer}: {what}")).collect()
 }
