@@ -73,7 +73,7 @@ fn a_scan_is_measured_into_a_table() {
 fn what_is_said_by_hand_of_a_body_is_heeded() {
     let dir = tempfile::tempdir().unwrap();
     let (scan, out, edits) = (somebody(dir.path()), dir.path().join("fitted"), dir.path().join("body.json"));
-    let mut fit = || {
+    let fit = || {
         let mut command = toile();
         command.arg("fit").arg("--scan").arg(&scan).arg("--out").arg(&out).arg("--edits").arg(&edits);
         command

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Raised whenever the same inputs and settings give another pose.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// With more than this share of the take before outside the scan, earlier takes are tried; one with half of that is believed.
 const OUTSIDE: f64 = 0.1;
 /// Key of the result that names the take whose scan was found again.
