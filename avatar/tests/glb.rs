@@ -5,8 +5,8 @@ mod common;
 
 use common::dressed;
 use nalgebra::{Isometry3, Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
-use toile_avatar::{Avatar, write_glb};
-use toile_character::{JOINT_COUNT, Pose, joint::JOINTS, skinning};
+use toile_avatar::{Avatar, VrmMeta, write_glb, write_vrm};
+use toile_character::{JOINT_COUNT, Joint, JointNaming, Pose, joint::JOINTS, skinning};
 
 type Imported = (gltf::Document, Vec<gltf::buffer::Data>);
 
@@ -93,6 +93,23 @@ fn skinned(file: &Imported, name: &str, globals: &[Matrix4<f64>]) -> Vec<Point3<
 fn worst(a: &[Point3<f32>], b: &[Point3<f32>]) -> f32 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max)
+}
+
+#[test]
+fn joints_are_called_as_asked_for_and_vrm_keeps_its_own() {
+    let joints = |bytes: &[u8]| -> Vec<String> {
+        let file = import(bytes);
+        file.0.skins().next().unwrap().joints().map(|node| node.name().unwrap().to_string()).collect()
+    };
+    for naming in JointNaming::ALL {
+        let avatar = Avatar { joint_names: naming, ..dressed() };
+        let expected: Vec<String> = JOINTS.iter().map(|&joint| naming.name(joint)).collect();
+        assert_eq!(joints(&write_glb(&avatar).unwrap()), expected);
+        assert_eq!(
+            joints(&write_vrm(&avatar, &VrmMeta::default()).unwrap())[Joint::LeftUpperArm.index()],
+            "leftUpperArm"
+        );
+    }
 }
 
 #[test]

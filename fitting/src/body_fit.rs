@@ -73,7 +73,7 @@ pub fn fit_body(
     settings: &FitSettings,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<BodyFit, FittingError> {
-    check(settings)?;
+    check(model, settings)?;
     let other;
     let model = if settings.joints == JointRegressor::Affine {
         model
@@ -103,10 +103,13 @@ pub fn fit_body(
     Ok(fit)
 }
 
-fn check(settings: &FitSettings) -> Result<(), FittingError> {
+fn check(model: &BodyModel, settings: &FitSettings) -> Result<(), FittingError> {
     let bad = |name, reason: &str| Err(FittingError::Setting { name, reason: reason.into() });
-    if settings.components == 0 {
-        return bad("components", "is 0; at least one shape component is needed");
+    if !(1..=model.component_count()).contains(&settings.components) {
+        return bad(
+            "components",
+            &format!("is {}; the model has 1 to {}", settings.components, model.component_count()),
+        );
     }
     if !(settings.noise > 0.0 && settings.shape_sigma > 0.0) {
         return bad("noise", "noise and shape_sigma must be above 0");

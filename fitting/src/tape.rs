@@ -157,13 +157,14 @@ impl MeasureTable {
     }
 
     /// As comma-separated lines: name, kind, centimetres, and the height of the tape's middle above the soles,
-    /// centimetres; the volume in litres last.
+    /// centimetres (empty for heights); the volume in litres last.
     pub fn csv(&self) -> String {
         let mut out = String::from("measurement,kind,value,unit,height\n");
         for m in &self.measures {
             let kind = format!("{:?}", m.kind).to_lowercase();
             let (low, high) = m.path.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[1]), h.max(p[1])));
-            let height = if m.path.is_empty() { String::new() } else { format!("{:.1}", 50.0 * (low + high)) };
+            let is_shown = !m.path.is_empty() && m.kind != MeasureKind::Height;
+            let height = if is_shown { format!("{:.1}", 50.0 * (low + high)) } else { String::new() };
             out += &format!("{},{kind},{:.1},cm,{height}\n", m.name, 100.0 * m.value_m);
         }
         out + &format!("volume,volume,{:.2},l,\n", self.volume_l)

@@ -131,7 +131,9 @@ pub fn drop_strips(mesh: &Mesh) -> Mesh {
     let core: Vec<u32> = (0..mesh.positions.len() as u32).filter(|&v| inner[v as usize]).collect();
     let mut kept = vec![false; mesh.positions.len()];
     grow(core, &neighbors, STRIP_REACH).iter().for_each(|&v| kept[v as usize] = true);
-    mesh.filter_triangles(|t| mesh.triangles[t].iter().all(|&v| kept[v as usize])).0
+    let by_hand = mesh.attributes.get(BY_HAND);
+    let stays = |v: u32| kept[v as usize] || by_hand.is_some_and(|said| said[v as usize] > SAID);
+    mesh.filter_triangles(|t| mesh.triangles[t].iter().all(|&v| stays(v))).0
 }
 
 /// Cuts away, with a ring of triangles, what crosses itself within `depth` metres of a rim: crumpled membrane that

@@ -12,8 +12,8 @@ use crate::{contacts::Contact, worn_surface::WornSurface};
 
 /// More than this share of a layer's triangles is not cut: such a layer cannot be parted.
 const MOST: f32 = 0.005;
-/// A contact that lacks more than this many gaps of what it aims at is under two thirds of the gap.
-const TOO_NEAR: f32 = 0.5;
+/// What is left of the gap that a contact aims at must be at least so much, metres.
+const TOO_NEAR: f32 = 0.001;
 
 /// Cuts the triangles of surface `upper` that cross a surface below, those whose contact among `left` lacks too much, and
 /// of each pair that crosses within the layer but is not among `own_before` one. Returns how many triangles were cut.
@@ -26,7 +26,8 @@ pub fn cut_rest(surfaces: &mut [WornSurface], upper: usize, own_before: &[[u32; 
             cut.insert(pair[1]);
         }
     }
-    let lacks = |c: &&Contact| c.upper.surface == upper && c.by.norm() > TOO_NEAR * surfaces[upper].gap;
+    let allowed = (surfaces[upper].gap - TOO_NEAR).max(0.5 * surfaces[upper].gap);
+    let lacks = |c: &&Contact| c.upper.surface == upper && c.by.norm() > allowed;
     let near: BTreeSet<u32> = left.iter().filter(lacks).map(|c| c.upper.nearest_corner()).collect();
     let at_near = |t: &u32| mesh.triangles[*t as usize].iter().any(|v| near.contains(v));
     cut.extend((0..mesh.triangles.len() as u32).filter(at_near));

@@ -199,6 +199,8 @@ impl Stroke {
             applied.near[v] = true;
             if d <= self.radius {
                 applied.painted[v] = sign;
+            } else if labels.garment[v] != local.garment[v] {
+                applied.painted[v] = 0.0;
             }
             labels.garment[v] = if d <= self.radius { belongs } else { local.garment[v] };
             labels.confidence[v] = if d <= self.radius { 1.0 } else { labels.confidence[v] };
@@ -223,6 +225,7 @@ impl HemLine {
             let signed = s * garment_side;
             applied.near[v] = true;
             applied.hem_distance[v] = signed;
+            applied.painted[v] = 0.0;
             labels.garment[v] = signed > 0.0;
             labels.confidence[v] = 1.0;
         }

@@ -118,7 +118,7 @@ pub struct ExtractionReport {
     pub height_noise_m: f32,
     /// Scale of colour differences where nothing is new.
     pub color_noise: f32,
-    /// Separate pieces.
+    /// Separate pieces, before edits.
     pub pieces: usize,
     /// Area whose label the edits changed, square metres.
     pub edited_m2: f32,
@@ -144,6 +144,7 @@ pub fn extract(
     take_off_steps(take, &graph, &evidence, &mut labels, garment_type, settings);
     clean::settle_filled(take.scan, &graph, &evidence, &mut labels, &bones(take));
     let pieces = clean::drop_islands(&graph, &mut labels, settings);
+    let is_two = looks_like_two(take, &graph, &evidence, &labels);
     progress(0.6);
     let applied = take.edits.map(|e| e.apply(take.scan, &graph, &evidence, &mut labels, settings));
     let mut in_take = garment_mesh(take, &graph, &evidence, &labels, garment_type, applied.as_ref(), settings);
@@ -154,7 +155,7 @@ pub fn extract(
     let weights = common_frame::weights(take, &in_take, settings);
     let garment = common_frame::to_common_frame(take, &in_take, &weights);
     let mut warnings = warnings(&graph, &evidence, &labels, &in_take, uncovered);
-    if looks_like_two(take, &graph, &evidence, &labels) {
+    if is_two {
         warnings.push(Warning::TwoAtOnce);
     }
     let mut report = report(take, &in_take, &evidence, garment_type, pieces);
@@ -197,7 +198,10 @@ fn label(
     let free = labelled(GarmentType::Other, None);
     match guess_type(take, graph, evidence, &free.1) {
         GarmentType::Other => free,
-        guess => labelled(guess, Some(&free.1)),
+        guess => {
+            let (garment_type, labels, uncovered) = labelled(guess, Some(&free.1));
+            (garment_type, labels, uncovered.max(free.2))
+        }
     }
 }
 

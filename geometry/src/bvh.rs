@@ -90,7 +90,7 @@ impl Bvh {
         tree
     }
 
-    /// Takes over moved `positions` of the mesh it was built from, and keeps the division: a fraction of the cost of
+    /// Takes over moved `positions` of the mesh it was built from (`triangles` as then), and keeps the division: a fraction of the cost of
     /// building anew. Queries stay exact; they get slower where neighbours in space have become others. O(n).
     pub fn refit(&mut self, positions: &[Point3<f32>], triangles: &[[u32; 3]]) {
         for (corners, &t) in self.corners.iter_mut().zip(&self.order) {

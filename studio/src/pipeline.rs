@@ -94,6 +94,8 @@ pub struct Summary {
 /// [`StudioError`] where a stage has no answer or a file cannot be read or written; what was done stays.
 pub fn process(root: &Path, goal: Goal, options: &Options, progress: &Progress) -> Result<Summary, StudioError> {
     let mut run = Run::open(root, options.last_layer.as_deref(), progress)?;
+    // What would fail only after a long time.
+    (1..run.layers.len()).try_for_each(|n| garment::told_thickness(&run, n).map(drop))?;
     run.plan(goal);
     let mut summary = Summary::default();
     for layer in &run.layers {

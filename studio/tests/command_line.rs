@@ -94,6 +94,20 @@ fn a_margin_needs_culling_and_is_a_length() {
 }
 
 #[test]
+fn a_thickness_that_no_cloth_has_is_said_before_any_work() {
+    let recording = common::Recording::new(3, 3);
+    exits(0, toile().args(recording.import("body")));
+    exits(0, toile().args(recording.import("coat")));
+    let path = recording.subject().join("subject.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::write(&path, format!("{text}\nthickness_mm = 11.0\n")).unwrap();
+    let answer = exits(1, toile().arg("process").arg(recording.subject()));
+    let message = answer.to_string();
+    assert!(message.contains("subject.toml") && message.contains("thickness_mm = 11"), "{message}");
+    assert!(!recording.subject().join("build").exists(), "nothing was fused");
+}
+
+#[test]
 fn edits_that_cannot_be_used_are_named_and_not_kept() {
     let recording = common::Recording::new(3, 3);
     exits(0, toile().args(recording.import("body")));

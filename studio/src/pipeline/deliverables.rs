@@ -43,7 +43,7 @@ pub fn run(run: &Run, body: &Body, options: &Options) -> Result<Record, StudioEr
     inputs.extend(bvh.map(Path::to_path_buf));
     let garments: Vec<Garment> = run.garment_numbers().map(|n| Garment::new(run, n)).collect::<Result<_, _>>()?;
     let mut settings = json!({
-        "name": run.title(), "garments": garments, "joint_names": joint_names,
+        "name": run.title(), "garments": plain(&garments)?, "joint_names": joint_names,
         "retarget": motion::settings(), "vrm": VrmMeta::default(),
     });
     if let Some(cull) = cull {

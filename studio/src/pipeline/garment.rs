@@ -7,7 +7,7 @@ use crate::{
     pipeline::{Run, body_file::read_json},
 };
 
-/// No cloth is thicker, millimetres: stacking does not look further.
+/// No cloth is taken for thicker, millimetres: stacking looks twice as far for the layers below.
 const THICKEST_MM: f32 = 10.0;
 
 /// The told type of take `n`'s garment, else the one that the stage `cut` guessed.
@@ -24,13 +24,21 @@ pub fn garment_type(run: &Run, n: usize) -> Option<GarmentType> {
 /// # Errors
 /// [`StudioError`] where `subject.toml` tells no thickness of cloth.
 pub fn thickness(run: &Run, n: usize) -> Result<f32, StudioError> {
+    let told = told_thickness(run, n)?;
+    Ok(told.unwrap_or_else(|| garment_type(run, n).unwrap_or(GarmentType::Other).thickness()))
+}
+
+/// What `subject.toml` says of the thickness of the cloth of take `n`'s garment, metres.
+///
+/// # Errors
+/// As [`thickness`].
+pub fn told_thickness(run: &Run, n: usize) -> Result<Option<f32>, StudioError> {
     match run.thickness_mm(n) {
-        Some(mm) if (0.0..=THICKEST_MM).contains(&mm) => Ok(mm * 1e-3),
-        Some(mm) => {
+        Some(mm) if !(0.0..=THICKEST_MM).contains(&mm) => {
             let layer = &run.layers[n];
             let reason = format!("{layer}: thickness_mm = {mm} is not between 0 and {THICKEST_MM}");
             Err(StudioError::format(&run.folders.root.join("subject.toml"), reason))
         }
-        None => Ok(garment_type(run, n).unwrap_or(GarmentType::Other).thickness()),
+        told => Ok(told.map(|mm| mm * 1e-3)),
     }
 }

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Raised whenever the same inputs and settings give other garments.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 /// Expected seconds for each garment.
 pub const COST: f64 = 1.5;
 /// Poses of the shipped walk in which crossings are counted.
@@ -47,7 +47,7 @@ pub fn run(run: &Run, body: &Body) -> Result<Record, StudioError> {
         root: &folders.root,
         folder: folders.layers(),
         inputs,
-        settings: json!({ "stack": plain(&settings)?, "thickness_m": thickness }),
+        settings: json!({ "stack": plain(&settings)?, "thickness_m": plain(&thickness)? }),
         outputs: garments.iter().map(|l| folders.garment(l)).collect(),
         outputs_vary: false,
     };
@@ -64,7 +64,8 @@ pub fn run(run: &Run, body: &Body) -> Result<Record, StudioError> {
         let told = garments.iter().zip(&report.layers).zip(&walking);
         let warnings = told.flat_map(|((l, report), walking)| warnings(l, report, walking)).collect();
         let free: Vec<Option<f32>> = layers.iter().map(free_share).collect();
-        let result = json!({ "layers": plain(&report.layers)?, "walking": plain(&walking)?, "free_share": free });
+        let result =
+            json!({ "layers": plain(&report.layers)?, "walking": plain(&walking)?, "free_share": plain(&free)? });
         Ok(Product { files, result, warnings, ..Product::default() })
     })
 }
