@@ -12,7 +12,9 @@ use std::{
     time::Duration,
 };
 
-use serde_json::Value;
+use nalgebra::Point3;
+use serde_json::{Value, json};
+use toile_geometry::ply;
 
 /// Files that may differ between two runs.
 const MAY_DIFFER: [&str; 2] = ["timings.json", "report.html"];
@@ -141,9 +143,8 @@ fn a_second_run_does_nothing() {
     assert_eq!(times(), before);
 }
 
-#[test]
-fn hidden_skin_is_left_out_on_request_and_comes_back() {
-    let Some(made) = demo() else { return };
+/// A copy of a subject, and the folder that holds it.
+fn copied(made: &Path) -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let subject = dir.path().join(made.file_name().unwrap());
     for (name, bytes) in files(made) {
@@ -151,6 +152,44 @@ fn hidden_skin_is_left_out_on_request_and_comes_back() {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     }
+    (dir, subject)
+}
+
+#[test]
+fn a_stroke_is_kept_heeded_at_each_rebuild_and_forgotten_on_request() {
+    let Some(made) = demo() else { return };
+    let (dir, subject) = copied(made);
+    let run = |command: &str, more: &[&str]| {
+        let output = toile(&[&[command, subject.to_str().unwrap()], more].concat()).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+    };
+    let cut = subject.join("build/01-trousers/cut.ply");
+    let before = fs::read(&cut).unwrap();
+    // In front, half-way up.
+    let front = ply::read(&cut).unwrap().positions.into_iter().filter(|p| (0.6..0.7).contains(&p.y));
+    let at = front.max_by(|a, b| a.z.total_cmp(&b.z)).unwrap();
+    let strokes = dir.path().join("strokes.json");
+    let stroke = json!({ "mark": "does-not-belong", "points": [[at.x, at.y, at.z]], "radius": 0.02 });
+    fs::write(&strokes, json!({ "version": 1, "strokes": [stroke] }).to_string()).unwrap();
+    run("edit", &["trousers", "--strokes", strokes.to_str().unwrap()]);
+    let edited = fs::read(&cut).unwrap();
+    let [old, new] = [&before, &edited].map(|bytes| ply::decode(bytes).unwrap().positions);
+    let distance = |p: &Point3<f32>, points: &[Point3<f32>]| points.iter().map(|q| (p - q).norm()).fold(1.0, f32::min);
+    let near = distance(&at, &new);
+    let elsewhere = new.iter().step_by(97).filter(|p| (*p - at).norm() > 0.1);
+    let away = elsewhere.map(|p| distance(p, &old)).fold(0.0, f32::max);
+    assert!(near > 0.01 && away < 0.005, "nearest {near} m, elsewhere up to {away} m");
+    fs::remove_file(&cut).unwrap();
+    run("extract", &[]);
+    assert!(fs::read(&cut).unwrap() == edited, "heeded at the rebuild");
+    run("edit", &["trousers", "--clear"]);
+    assert!(fs::read(&cut).unwrap() == before && !subject.join("edits/01-trousers.json").exists());
+}
+
+#[test]
+fn hidden_skin_is_left_out_on_request_and_comes_back() {
+    let Some(made) = demo() else { return };
+    let (_dir, subject) = copied(made);
     let export = |more: &[&str]| {
         let output = toile(&[&["export", subject.to_str().unwrap()], more].concat()).output().unwrap();
         assert!(output.status.success(), "{output:?}");
