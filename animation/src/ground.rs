@@ -1,9 +1,7 @@
 //! Where a motion stands: on the floor, starting at the origin, or staying there.
 
 use nalgebra::Vector3;
-use toile_character::{Joint, Pose, Skeleton};
-
-use crate::feet::foot_height;
+use toile_character::{Joint, Pose, Skeleton, feet::foot_height};
 
 /// Moves the whole motion so that standing feet stand on the floor and the hips start above the origin. Where the
 /// source's hips never rise or sink, which hand-keyed cycles do, each pose is set on the floor by itself.

@@ -20,9 +20,7 @@
 
 pub mod bvh;
 mod bvh_read;
-mod direction;
 pub mod error;
-mod feet;
 mod gait;
 mod ground;
 mod joint_names;
@@ -32,7 +30,6 @@ pub mod resample;
 pub mod retarget;
 mod source;
 mod stance;
-mod two_bone;
 pub mod walk;
 
 pub use bvh::Bvh;

@@ -2,8 +2,6 @@
 
 use toile_character::{Motion, Pose};
 
-use crate::resample::blend;
-
 /// Seconds over which the end goes over into the start.
 const BLEND: f64 = 0.25;
 
@@ -28,7 +26,7 @@ pub fn close_loop(motion: &Motion) -> Motion {
     for (i, pose) in poses[start_of_blend..].iter_mut().enumerate() {
         let share = i as f64 / window as f64;
         let eased = share * share * (3.0 - 2.0 * share);
-        *pose = blend(pose, first, eased);
+        *pose = pose.interpolated(first, eased);
     }
     Motion { name: motion.name.clone(), frame_time: motion.frame_time, poses }
 }

@@ -8,13 +8,9 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use toile_character::{JOINT_COUNT, Joint, Skeleton};
+use toile_geometry::direction::{align, nearest_axis, swing, unit_or};
 
-use crate::{
-    bvh::Bvh,
-    direction::{align, nearest_axis, swing, unit_or},
-    source::Source,
-    stance,
-};
+use crate::{bvh::Bvh, source::Source, stance};
 
 /// `source_joint_from_target_joint` rotations and the source's up axis.
 #[derive(Debug, Clone)]

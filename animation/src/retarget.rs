@@ -6,13 +6,14 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use toile_character::{Joint, Motion, Pose, Skeleton, joint::JOINTS};
+use toile_character::{
+    Joint, Motion, Pose, Skeleton, feet::lift_out_of_floor, interpolation::rotation_between, joint::JOINTS,
+};
+use toile_geometry::direction::{align, swing, unit_or};
 
 use crate::{
     AnimationError,
     bvh::Bvh,
-    direction::{align, swing, unit_or},
-    feet::lift_out_of_floor,
     ground,
     looping::close_loop,
     reference::{Reference, bone, find_reference},
@@ -252,12 +253,7 @@ impl TrunkTurns {
 fn along(chain: &[UnitQuaternion<f64>], share: f64) -> UnitQuaternion<f64> {
     let at = share * (chain.len() - 1) as f64;
     let (low, high) = (at.floor() as usize, (at.ceil() as usize).min(chain.len() - 1));
-    shortest(&chain[low], &chain[high], at - low as f64)
-}
-
-/// Spherical interpolation the short way, also of opposite quaternions.
-pub(crate) fn shortest(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
-    a.try_slerp(b, share, 1e-9).unwrap_or(if share < 0.5 { *a } else { *b })
+    rotation_between(&chain[low], &chain[high], at - low as f64)
 }
 
 fn mid_legs(source: &Source, world: &[Isometry3<f64>]) -> Point3<f64> {

@@ -2,10 +2,10 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use toile_character::{Joint, Skeleton};
+use toile_geometry::direction::{align, swing};
 
 use crate::{
     bvh::Bvh,
-    direction::{align, swing},
     reference::{Reference, bone, sampled},
     source::Source,
 };

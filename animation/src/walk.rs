@@ -7,13 +7,12 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use toile_character::Joint;
+use toile_character::{Joint, two_bone::bend};
 
 use crate::{
     AnimationError,
     bvh::{Bvh, BvhJoint, Channel},
     gait::{Foot, Gait},
-    two_bone::bend,
 };
 
 /// What the walk is like.

@@ -2,15 +2,12 @@
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
-use toile_character::SkinWeights;
+use toile_character::{FREE_PART, SkinWeights};
 
 use crate::{
     AvatarLayer,
     buffer::{Buffer, Shape, Target},
 };
-
-/// The mesh attribute that is 1 where a skirt or dress hangs free of the body, 0 where it lies close (Hu et al. 2017, §6.2).
-const FREE: &str = "free";
 
 /// Appends the layer's arrays to `buffer`; returns the glTF mesh, which uses material `material`.
 pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buffer) -> Value {
@@ -29,7 +26,7 @@ pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buff
         let colors = buffer.add(&linear_colors(&mesh.colors), Shape::Vec4, Target::Vertices);
         attributes["COLOR_0"] = json!(buffer.normalized(colors));
     }
-    if let Some(free) = mesh.attributes.get(FREE) {
+    if let Some(free) = mesh.attributes.get(FREE_PART) {
         attributes["_FREE"] = json!(buffer.add(free, Shape::Scalar, Target::Vertices));
     }
     json!({
@@ -64,7 +61,7 @@ pub(crate) fn extras(layer: &AvatarLayer) -> Value {
         // shortest decimal of the f32, not its binary expansion
         extras["thickness_m"] = thickness.to_string().parse::<f64>().map_or(Value::Null, |t| json!(t));
     }
-    if let Some(free) = layer.mesh.attributes.get(FREE).filter(|free| !free.is_empty()) {
+    if let Some(free) = layer.mesh.attributes.get(FREE_PART).filter(|free| !free.is_empty()) {
         let share = free.iter().map(|f| f64::from(*f)).sum::<f64>() / free.len() as f64;
         extras["free_percent"] = json!((share * 100.0).round() as u32);
     }

@@ -6,7 +6,9 @@
 //! - [`SkinWeights`] and [`skinning`]: linear blend skinning (Hu et al. 2017, eq. 3) and its inverse;
 //! - [`BodyModel`]: the statistical body (eq. 1 joints by [`mean_value`], eq. 2 shape) from the committed asset ([`asset`]);
 //! - [`dress_pose`]: the A- and T-pose of any skeleton;
-//! - [`Motion`]: a pose over time.
+//! - [`Motion`]: a pose over time; [`interpolation`]: poses between poses;
+//! - [`two_bone`], [`feet`]: inverse kinematics of arms and legs, feet kept out of the floor;
+//! - [`GarmentType`]: what kind of garment a layer is.
 //!
 //! Subject frame: +Y up, +Z the front, +X the subject's left; metres, radians, seconds.
 //!
@@ -25,6 +27,10 @@ pub mod asset;
 pub mod body_model;
 pub mod dress_pose;
 pub mod error;
+pub mod feet;
+pub mod garment_layer;
+pub mod garment_type;
+pub mod interpolation;
 pub mod joint;
 pub mod limits;
 pub mod mean_value;
@@ -35,9 +41,12 @@ pub mod skeleton;
 pub mod skin;
 pub mod skinning;
 pub mod transfer;
+pub mod two_bone;
 
 pub use body_model::{BodyModel, JointRegressor, PopulationInfo, Region};
 pub use error::CharacterError;
+pub use garment_layer::FREE_PART;
+pub use garment_type::GarmentType;
 pub use joint::{JOINT_COUNT, Joint};
 pub use limits::{JointLimit, joint_limits};
 pub use motion::Motion;

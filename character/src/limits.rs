@@ -50,7 +50,7 @@ pub fn joint_limits(skeleton: &Skeleton) -> Vec<JointLimit> {
 impl JointLimit {
     /// How far a joint's rotation lies beyond the limit, radians: negative below `low`, 0 within.
     pub fn beyond(&self, rotation: &UnitQuaternion<f64>) -> f64 {
-        let angle = shortest(rotation).dot(&self.axis);
+        let angle = rotation_vector(rotation).dot(&self.axis);
         (angle - self.high).max(0.0) + (angle - self.low).min(0.0)
     }
 
@@ -62,13 +62,13 @@ impl JointLimit {
             parent = pose.rotation(joint) * parent;
             at = joint.parent();
         }
-        let turned = shortest(&pose.rotation(self.joint)).dot(&self.axis);
+        let turned = rotation_vector(&pose.rotation(self.joint)).dot(&self.axis);
         Self { axis: parent * self.axis, low: self.low - turned, high: self.high - turned, ..*self }
     }
 }
 
 /// Rotation vector of at most half a turn.
-pub fn shortest(q: &UnitQuaternion<f64>) -> Vector3<f64> {
+pub fn rotation_vector(q: &UnitQuaternion<f64>) -> Vector3<f64> {
     let q = if q.w < 0.0 { UnitQuaternion::new_unchecked(-q.into_inner()) } else { *q };
     q.scaled_axis()
 }

@@ -1,7 +1,7 @@
 //! What is known before any scan is seen: shape is unit normal, joints stay near a pose and within human limits.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use toile_character::{Joint, JointLimit, Pose, Skeleton, joint_limits, limits::shortest};
+use toile_character::{Joint, JointLimit, Pose, Skeleton, joint_limits, limits::rotation_vector};
 
 use crate::{
     articulated::{Columns, Posed, State, left_jacobian_inverse, parent_rotation},
@@ -45,7 +45,7 @@ impl JointPrior {
             let Some(at) = columns.of(joint) else { continue };
             let to_local = parent_rotation(joint, &posed.frames).inverse().to_rotation_matrix().into_inner();
             let rotation = state.pose.rotation(joint);
-            let v = shortest(&(rotation * self.center.rotation(joint).inverse()));
+            let v = rotation_vector(&(rotation * self.center.rotation(joint).inverse()));
             let inverse_sigma = 1.0 / self.sigma[joint.index()].max(1e-6);
             let jacobian = left_jacobian_inverse(&v) * to_local * inverse_sigma;
             equations.add_triple(at, &(v * inverse_sigma), &jacobian);
@@ -67,7 +67,7 @@ fn add_limit(
     if beyond == 0.0 {
         return;
     }
-    let row = limit.axis.transpose() * left_jacobian_inverse(&shortest(rotation)) * to_local / LIMIT_SIGMA;
+    let row = limit.axis.transpose() * left_jacobian_inverse(&rotation_vector(rotation)) * to_local / LIMIT_SIGMA;
     let mut jacobian = Matrix3::zeros();
     jacobian.set_row(0, &row);
     equations.add_triple(at, &Vector3::new(beyond / LIMIT_SIGMA, 0.0, 0.0), &jacobian);

@@ -5,7 +5,11 @@
 //! - [`Mesh`]: an indexed triangle mesh with optional normals, colours and named vertex attributes;
 //! - [`camera::PinholeCamera`]: pinhole projection with optional Brown–Conrady distortion;
 //! - [`bvh::Bvh`]: closest point, ray and overlap queries over a mesh's triangles;
-//! - [`ply`], [`obj`]: files; [`topology`]: edges, neighbours, boundary loops, components.
+//! - [`raster::rasterize`]: what a camera sees of a mesh;
+//! - [`topology`]: edges, neighbours, boundary loops, components; [`areas`], [`laplacian`], [`edge_distance`],
+//!   [`surface_solve`]: measures and equations on a surface;
+//! - [`statistics`]: medians, quantiles, robust spreads; [`lanes`]: vector instructions chosen at run time;
+//! - [`ply`], [`obj`]: files.
 //!
 //! Conventions: metres, right-handed. Subject frame: +Y up, +Z the front, origin on the floor. Camera frame:
 //! +X right, +Y down, +Z forward, pixel centres at integers. `a_from_b` maps coordinates in frame b to frame a.
@@ -22,23 +26,32 @@
 //! assert!((hit.distance - 0.5).abs() < 1e-6);
 //! ```
 
+pub mod areas;
 pub mod bvh;
 pub mod camera;
 pub mod color_transfer;
 pub mod components;
 pub mod decimate;
+pub mod direction;
+pub mod edge_distance;
+pub mod element;
 pub mod error;
 pub mod handles;
 pub mod holes;
 pub mod intersection;
+pub mod lanes;
+pub mod laplacian;
 pub mod max_flow;
 pub mod mesh;
 pub mod obj;
 pub mod ply;
 pub mod polygon;
 pub mod predicates;
+pub mod raster;
 pub mod remesh;
 pub mod smooth;
+pub mod statistics;
+pub mod surface_solve;
 pub mod topology;
 pub mod triangle;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::{GeometryError, Rigid};
+use crate::{GeometryError, Rigid, areas::double_area};
 
 /// An indexed triangle mesh, counter-clockwise seen from outside.
 ///
@@ -77,7 +77,8 @@ impl Mesh {
 
     /// Total area, square metres.
     pub fn area(&self) -> f64 {
-        self.triangles.iter().map(|t| double_area(&self.positions, t) * 0.5).sum()
+        let corners = |t: &[u32; 3]| t.map(|v| self.positions[v as usize].coords.cast::<f64>());
+        self.triangles.iter().map(|t| double_area(corners(t)) * 0.5).sum()
     }
 
     /// Signed volume, cubic metres; meaningful for a closed mesh, positive when normals point outward.
@@ -134,11 +135,6 @@ impl Mesh {
 
 fn pick<T: Copy>(values: &[T], indices: &[u32]) -> Vec<T> {
     if values.is_empty() { Vec::new() } else { indices.iter().map(|&i| values[i as usize]).collect() }
-}
-
-fn double_area(positions: &[Point3<f32>], t: &[u32; 3]) -> f64 {
-    let [a, b, c] = t.map(|v| positions[v as usize].cast::<f64>());
-    (b - a).cross(&(c - a)).norm()
 }
 
 /// Unit normals of triangles over `positions`; zero for degenerate ones.

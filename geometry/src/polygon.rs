@@ -1,23 +1,28 @@
-//! Triangulation of a closed polygon in space by least area.
+//! Triangulation of a closed polygon in space with minimum area (Barequet and Sharir 1995).
 
 use std::collections::BTreeMap;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, RealField};
 
-/// Corners above which a polygon is first cut in two by its best chord.
-const MOST: usize = 420;
+/// A polygon with more corners is first cut in two by its best chord.
+const MAX_CORNERS: usize = 420;
 
-/// Triangles (corner indices, in the polygon's direction) of least total area, by dynamic programming, O(n³); very
+/// f32 or f64.
+pub trait Scalar: RealField + Copy + Into<f64> + From<f32> {}
+impl Scalar for f32 {}
+impl Scalar for f64 {}
+
+/// Triangles (corner indices, in the polygon's direction) with minimum total area, by dynamic programming, O(n³); very
 /// long polygons are cut in two first. `blocked(i, k)` forbids the chord between two corners that are not
-/// neighbours. `None` where no triangulation avoids the blocked chords.
-pub fn triangulate(points: &[Point3<f64>], blocked: &dyn Fn(usize, usize) -> bool) -> Option<Vec<[u32; 3]>> {
+/// neighbours. `None` for fewer than three corners and where no triangulation avoids the blocked chords.
+pub fn triangulate<T: Scalar>(points: &[Point3<T>], blocked: &dyn Fn(usize, usize) -> bool) -> Option<Vec<[u32; 3]>> {
     let all: Vec<usize> = (0..points.len()).collect();
     let mut triangles = Vec::with_capacity(points.len().saturating_sub(2));
     divide(points, &all, blocked, &mut triangles).then_some(triangles)
 }
 
-fn divide(
-    points: &[Point3<f64>],
+fn divide<T: Scalar>(
+    points: &[Point3<T>],
     ring: &[usize],
     blocked: &dyn Fn(usize, usize) -> bool,
     out: &mut Vec<[u32; 3]>,
@@ -25,8 +30,8 @@ fn divide(
     if ring.len() < 3 {
         return false;
     }
-    if ring.len() <= MOST {
-        return least_area(points, ring, blocked, out);
+    if ring.len() <= MAX_CORNERS {
+        return minimum_area(points, ring, blocked, out);
     }
     let Some((a, b)) = best_chord(points, ring, blocked) else { return false };
     let near: Vec<usize> = ring[a..=b].to_vec();
@@ -35,8 +40,8 @@ fn divide(
 }
 
 /// The free chord that is shortest for the way around that it saves, with at least a quarter of the ring each side.
-fn best_chord(
-    points: &[Point3<f64>],
+fn best_chord<T: Scalar>(
+    points: &[Point3<T>],
     ring: &[usize],
     blocked: &dyn Fn(usize, usize) -> bool,
 ) -> Option<(usize, usize)> {
@@ -46,7 +51,7 @@ fn best_chord(
     for a in (0..n).step_by(step) {
         for b in (a + n / 4..n.min(a + n - n / 4)).step_by(step) {
             if !blocked(ring[a], ring[b]) {
-                let d = (points[ring[a]] - points[ring[b]]).norm();
+                let d: f64 = (points[ring[a]] - points[ring[b]]).norm().into();
                 best.entry(d.to_bits()).or_insert((a, b));
             }
         }
@@ -54,8 +59,8 @@ fn best_chord(
     best.into_values().next()
 }
 
-fn least_area(
-    points: &[Point3<f64>],
+fn minimum_area<T: Scalar>(
+    points: &[Point3<T>],
     ring: &[usize],
     blocked: &dyn Fn(usize, usize) -> bool,
     out: &mut Vec<[u32; 3]>,
@@ -65,13 +70,13 @@ fn least_area(
         let [a, b, c] = [i, j, k].map(|x| points[ring[x]]);
         (b - a).cross(&(c - a)).norm()
     };
-    let mut cost = vec![0.0f64; n * n];
+    let mut cost = vec![T::zero(); n * n];
     let mut middle = vec![0u32; n * n];
     for gap in 2..n {
         for i in 0..n - gap {
             let k = i + gap;
             let closing = i == 0 && k == n - 1;
-            let mut best = (f64::INFINITY, 0);
+            let mut best = (T::from(f32::INFINITY), 0);
             if closing || !blocked(ring[i], ring[k]) {
                 for j in i + 1..k {
                     let c = cost[i * n + j] + cost[j * n + k];
@@ -87,7 +92,7 @@ fn least_area(
             middle[i * n + k] = best.1 as u32;
         }
     }
-    if !cost[n - 1].is_finite() {
+    if !Into::<f64>::into(cost[n - 1]).is_finite() {
         return false;
     }
     let mut stack = vec![(0, n - 1)];

@@ -1,6 +1,6 @@
 //! One small CPU rasteriser for reports, sensors and tests.
 //!
-//! - [`raster::rasterize`]: meshes seen by a pinhole camera as depth, triangle and barycentric coordinates a pixel;
+//! - [`rasterize`] (of the geometry crate): meshes seen by a pinhole camera as depth, triangle and barycentric coordinates a pixel;
 //! - [`shade`]: hemisphere and key light on sRGB albedo;
 //! - [`picture::picture`]: meshes fitted into a [`View`], coloured by their vertices, plain, as clay or by an attribute;
 //! - [`sheet::contact_sheet`], [`sheet::scale_bar`], [`label::draw`]: pictures side by side, legends, small text;
@@ -29,7 +29,6 @@ mod font;
 pub mod label;
 pub mod picture;
 pub mod png;
-pub mod raster;
 pub mod shade;
 pub mod sheet;
 pub mod view;
@@ -37,5 +36,5 @@ pub mod view;
 pub use error::RenderError;
 pub use image::RgbImage;
 pub use picture::{Drawn, Paint, picture};
-pub use raster::{Camera, NOTHING, Raster, rasterize};
+pub use toile_geometry::raster::{Camera, NOTHING, Raster, rasterize};
 pub use view::View;

@@ -3,11 +3,13 @@
 use image::RgbImage;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-use toile_geometry::Mesh;
+use toile_geometry::{
+    Mesh,
+    raster::{Camera, Raster, rasterize},
+};
 
 use crate::{
     RenderError, View, colormap,
-    raster::{Camera, Raster, rasterize},
     shade::{Lights, linear, srgb},
 };
 

@@ -1,9 +1,7 @@
 //! From where a picture is taken.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use toile_geometry::{Rigid, camera::PinholeCamera};
-
-use crate::raster::Camera;
+use toile_geometry::{Rigid, camera::PinholeCamera, raster::Camera};
 
 /// Share of the picture that stays free around what is shown.
 const MARGIN: f64 = 0.04;

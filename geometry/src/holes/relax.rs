@@ -5,7 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Point3, Vector3};
 
 use super::patch::Patch;
-use crate::{Mesh, topology::VertexTriangles};
+use crate::{
+    Mesh,
+    areas::double_area,
+    laplacian::{Row, cotangent_laplacian},
+    topology::VertexTriangles,
+};
 
 /// Rings of the surroundings that the plate continues.
 const RINGS: usize = 2;
@@ -85,35 +90,23 @@ fn surroundings(patch: &Patch, mesh: &Mesh, around: &VertexTriangles, border: &[
 
 /// Cotangent weights over the square root of each vertex' area, for the first `count` vertices.
 fn laplacian_rows(positions: &[Vector3<f64>], triangles: &[[u32; 3]], count: usize) -> Vec<Vec<(u32, f64)>> {
-    let mut weights: Vec<BTreeMap<u32, f64>> = vec![BTreeMap::new(); count];
-    let mut areas = vec![0.0; count];
-    let mean = triangles.iter().map(|t| double_area(positions, t)).sum::<f64>() / triangles.len().max(1) as f64;
-    for t in triangles {
-        let area = double_area(positions, t).max(mean * 1e-3);
-        for k in 0..3 {
-            let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
-            let [pa, pb, pc] = [a, b, c].map(|v| positions[v as usize]);
-            let cotangent = ((pb - pa).dot(&(pc - pa)) / area).clamp(0.05, 20.0);
-            for (v, n) in [(b, c), (c, b)] {
-                if let Some(row) = weights.get_mut(v as usize) {
-                    *row.entry(n).or_default() += 0.5 * cotangent;
-                }
-            }
-            if let Some(sum) = areas.get_mut(a as usize) {
-                *sum += area / 6.0;
-            }
-        }
-    }
-    let scaled = |(row, area): (BTreeMap<u32, f64>, f64)| {
-        let scale = (mean / area.max(mean * 1e-3)).sqrt();
-        row.into_iter().map(|(n, w)| (n, w * scale)).collect()
+    let mut doubled: Vec<f64> = triangles.iter().map(|t| double_area(t.map(|v| positions[v as usize]))).collect();
+    let mean = doubled.iter().sum::<f64>() / triangles.len().max(1) as f64;
+    let least = mean * 1e-3;
+    doubled.iter_mut().for_each(|d| *d = d.max(least));
+    let half_cotangent = |t: usize, k: usize| {
+        let [a, b, c] = [k, k + 1, k + 2].map(|k| positions[triangles[t][k % 3] as usize]);
+        0.5 * ((b - a).dot(&(c - a)) / doubled[t]).clamp(0.05, 20.0)
     };
-    weights.into_iter().zip(areas).map(scaled).collect()
-}
-
-fn double_area(positions: &[Vector3<f64>], t: &[u32; 3]) -> f64 {
-    let [a, b, c] = t.map(|v| positions[v as usize]);
-    (b - a).cross(&(c - a)).norm()
+    let mut areas = vec![0.0; count];
+    for (t, d) in triangles.iter().zip(&doubled) {
+        t.iter().filter(|&&v| (v as usize) < count).for_each(|&v| areas[v as usize] += d / 6.0);
+    }
+    let scaled = |(v, row): (usize, Row)| {
+        let scale = (mean / areas[v].max(least)).sqrt();
+        row.into_iter().filter(|e| e.0 as usize != v).map(|(n, c)| (n, -c * scale)).collect()
+    };
+    cotangent_laplacian(triangles, count, half_cotangent).into_iter().enumerate().map(scaled).collect()
 }
 
 /// Conjugate gradients on the normal equations of L x = 0 over the free entries.

@@ -1,26 +1,36 @@
 //! Two bones bent so that the second ends at a given point.
 
 use nalgebra::{UnitQuaternion, Vector3};
-
-use crate::direction::{frame, unit_or};
+use toile_geometry::direction::{frame, unit_or};
 
 /// World rotations of an upper and a lower bone, both along -y at rest, of lengths `upper` and `lower`, that start
 /// at the origin and end at `target`, bent towards `pole`. A target out of reach is pointed at.
-pub(crate) fn bend(
+pub fn bend(
     target: &Vector3<f64>,
     upper: f64,
     lower: f64,
     pole: &Vector3<f64>,
 ) -> (UnitQuaternion<f64>, UnitQuaternion<f64>) {
     let along = unit_or(target, &-Vector3::y());
-    let reach = target.norm().clamp((upper - lower).abs() + 1e-6, upper + lower);
     let side = unit_or(&(pole - along * along.dot(pole)), &Vector3::z());
-    // law of cosines: how far along the line the middle joint is
-    let foot = (upper * upper - lower * lower + reach * reach) / (2.0 * reach);
-    let height = (upper * upper - foot * foot).max(0.0).sqrt();
-    let middle = along * foot + side * height;
+    let (middle, reach) = middle_joint(&along, target.norm(), &side, upper, lower);
     let end = along * reach;
     (turned(&middle, &side), turned(&(end - middle), &side))
+}
+
+/// Where the middle joint of two bones is, from their start, when their end is `distance` along the unit vector `along`
+/// and they bend towards the unit vector `side`; and that distance, clamped to what the bones reach.
+pub fn middle_joint(
+    along: &Vector3<f64>,
+    distance: f64,
+    side: &Vector3<f64>,
+    upper: f64,
+    lower: f64,
+) -> (Vector3<f64>, f64) {
+    let reach = distance.clamp((upper - lower).abs() + 1e-6, upper + lower);
+    // Law of cosines: the middle joint's foot on the line from start to end.
+    let foot = (upper * upper - lower * lower + reach * reach) / (2.0 * reach);
+    (along * foot + side * (upper * upper - foot * foot).max(0.0).sqrt(), reach)
 }
 
 /// The rotation that takes -y to `bone` and +z near to `front`.

@@ -2,16 +2,16 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// Below this length a direction tells nothing (file units or metres).
+/// A shorter vector has no direction (metres or the units of a file).
 const SHORTEST: f64 = 1e-9;
 
 /// The unit vector along `v`, or `fallback` where `v` vanishes.
-pub(crate) fn unit_or(v: &Vector3<f64>, fallback: &Vector3<f64>) -> Vector3<f64> {
+pub fn unit_or(v: &Vector3<f64>, fallback: &Vector3<f64>) -> Vector3<f64> {
     v.try_normalize(SHORTEST).unwrap_or(*fallback)
 }
 
 /// The smallest rotation that takes direction `from` to direction `to`; none where either vanishes.
-pub(crate) fn swing(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub fn swing(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
     let (Some(from), Some(to)) = (from.try_normalize(SHORTEST), to.try_normalize(SHORTEST)) else {
         return UnitQuaternion::identity();
     };
@@ -23,7 +23,7 @@ pub(crate) fn swing(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f6
 }
 
 /// The frame whose first axis is `primary` and whose second is as near to `secondary` as it can be.
-pub(crate) fn frame(primary: &Vector3<f64>, secondary: &Vector3<f64>) -> UnitQuaternion<f64> {
+pub fn frame(primary: &Vector3<f64>, secondary: &Vector3<f64>) -> UnitQuaternion<f64> {
     let first = unit_or(primary, &Vector3::x());
     let across = secondary - first * first.dot(secondary);
     let any = first.cross(&Vector3::ith_axis(first.iamin())).normalize();
@@ -33,12 +33,12 @@ pub(crate) fn frame(primary: &Vector3<f64>, secondary: &Vector3<f64>) -> UnitQua
 }
 
 /// The rotation that takes `from`'s two directions to `to`'s: the first exactly, the second as nearly as can be.
-pub(crate) fn align(from: [&Vector3<f64>; 2], to: [&Vector3<f64>; 2]) -> UnitQuaternion<f64> {
+pub fn align(from: [&Vector3<f64>; 2], to: [&Vector3<f64>; 2]) -> UnitQuaternion<f64> {
     frame(to[0], to[1]) * frame(from[0], from[1]).inverse()
 }
 
 /// The coordinate axis, with its sign, that is nearest to `v`.
-pub(crate) fn nearest_axis(v: &Vector3<f64>) -> Vector3<f64> {
+pub fn nearest_axis(v: &Vector3<f64>) -> Vector3<f64> {
     let k = v.iamax();
     Vector3::ith(k, v[k].signum())
 }

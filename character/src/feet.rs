@@ -5,9 +5,9 @@
 //! above the floor are left alone, and the correction grows from nothing, so nothing jumps.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use toile_character::{Joint, Pose, Skeleton};
+use toile_geometry::direction::{swing, unit_or};
 
-use crate::direction::{swing, unit_or};
+use crate::{Joint, Pose, Skeleton, two_bone::middle_joint};
 
 /// Length of the toes by that of the foot from ankle to ball.
 const TOES_BY_FOOT: f64 = 0.5;
@@ -15,7 +15,7 @@ const TOES_BY_FOOT: f64 = 0.5;
 const HEEL_BY_FOOT: f64 = 0.35;
 
 /// Lifts every foot that is below the floor of the skeleton's rest.
-pub(crate) fn lift_out_of_floor(target: &Skeleton, poses: &mut [Pose]) {
+pub fn lift_out_of_floor(target: &Skeleton, poses: &mut [Pose]) {
     for pose in poses {
         for upper in [Joint::LeftUpperLeg, Joint::RightUpperLeg] {
             lift(target, pose, upper);
@@ -24,7 +24,7 @@ pub(crate) fn lift_out_of_floor(target: &Skeleton, poses: &mut [Pose]) {
 }
 
 /// Height of the lowest of heel and ball above the floor, metres; negative below it.
-pub(crate) fn foot_height(target: &Skeleton, pose: &Pose, foot: Joint, toes: Joint) -> f64 {
+pub fn foot_height(target: &Skeleton, pose: &Pose, foot: Joint, toes: Joint) -> f64 {
     let frames = pose.joint_frames(target);
     let ankle = frames[foot.index()];
     let rest_bone = target.position(toes) - target.position(foot);
@@ -54,13 +54,11 @@ fn raise_ankle(target: &Skeleton, pose: &mut Pose, leg: [Joint; 3], height: f64)
     let wanted = ankle + Vector3::y() * height;
     let (thigh, shank) = ((knee - hip).norm(), (ankle - knee).norm());
     let along = unit_or(&(wanted - hip), &-Vector3::y());
-    let reach = (wanted - hip).norm().clamp((thigh - shank).abs() + 1e-6, thigh + shank);
     let front = thigh_turn * Vector3::z();
     let bent = knee - hip - along * along.dot(&(knee - hip));
     // A straight leg has no plane of its own: its knee goes to its front.
     let side = unit_or(&(bent + (front - along * along.dot(&front)) * 1e-3), &Vector3::z());
-    let foot = (thigh * thigh - shank * shank + reach * reach) / (2.0 * reach);
-    let new_knee = along * foot + side * (thigh * thigh - foot * foot).max(0.0).sqrt();
+    let (new_knee, reach) = middle_joint(&along, (wanted - hip).norm(), &side, thigh, shank);
     let thigh_turn = swing(&(knee - hip), &new_knee) * thigh_turn;
     let shank_turn = swing(&(ankle - knee), &(along * reach - new_knee)) * shank_turn;
     let hips_turn = frames[Joint::Hips.index()].rotation;
@@ -95,7 +93,7 @@ mod tests {
 
     #[test]
     fn a_sunken_foot_is_lifted_by_the_knee_alone() {
-        let model = toile_character::BodyModel::load_default().unwrap();
+        let model = crate::BodyModel::load_default().unwrap();
         let person = model.skeleton_at(&vec![0.0; model.component_count()]);
         let mut sunken = Pose::identity();
         sunken.translation.y = -0.04;

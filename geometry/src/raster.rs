@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use toile_geometry::{Mesh, Rigid, camera::PinholeCamera};
+
+use crate::{Mesh, Rigid, camera::PinholeCamera};
 
 /// Triangle index of a pixel that shows nothing.
 pub const NOTHING: u32 = u32::MAX;
