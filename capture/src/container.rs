@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::CaptureError;
+use crate::{CaptureError, files::open_regular};
 
 /// The largest chunk that is read; ours stay near 4 MiB.
 const MAX_CHUNK_BYTES: u64 = 512 << 20;
@@ -87,12 +87,8 @@ pub(crate) struct Container {
 impl Container {
     /// Opens a file and checks that it is MCAP.
     pub(crate) fn open(path: &Path) -> Result<Self, CaptureError> {
-        let mut file = File::open(path).map_err(|error| CaptureError::io(path, error))?;
-        let metadata = file.metadata().map_err(|error| CaptureError::io(path, error))?;
-        if !metadata.is_file() {
-            return Err(CaptureError::format(path, "is a folder, not a recording"));
-        }
-        let length = metadata.len();
+        let mut file = open_regular(path)?;
+        let length = file.metadata().map_err(|error| CaptureError::io(path, error))?.len();
         if length == 0 {
             return Err(CaptureError::format(path, "the file is empty: nothing was recorded into it"));
         }

@@ -2,11 +2,13 @@
 
 use std::{io::ErrorKind, path::PathBuf};
 
+use crate::printable::printable_path;
+
 /// Errors of the capture crate.
 #[derive(Debug, thiserror::Error)]
 pub enum CaptureError {
     /// A file could not be read or written.
-    #[error("{path}: {source}")]
+    #[error("{}: {source}", printable_path(path))]
     Io {
         /// The file.
         path: PathBuf,
@@ -15,19 +17,29 @@ pub enum CaptureError {
     },
     /// There is no room left for a file.
     #[error(
-        "{path}: the disk is full; free some space and run the command again (files that were complete before are untouched)"
+        "{}: the disk is full; free some space and run the command again (files that were complete before are untouched)",
+        printable_path(path)
     )]
     DiskFull {
         /// The file that was being written.
         path: PathBuf,
     },
     /// A file or folder is not what its format says.
-    #[error("{path}: {reason}")]
+    #[error("{}: {reason}", printable_path(path))]
     Format {
         /// The file or folder.
         path: PathBuf,
         /// What is wrong, where, and what to do.
         reason: String,
+    },
+    /// Another process writes the same subject or recording.
+    #[error(
+        "{}: another toile is writing here; wait until it has ended and run the command again",
+        printable_path(path)
+    )]
+    Busy {
+        /// The subject's folder, or the recording.
+        path: PathBuf,
     },
     /// A frame cannot be used.
     #[error("frame {index}: {reason}")]
@@ -51,7 +63,9 @@ impl CaptureError {
     /// Wraps an I/O error with the path it concerns; a full disk (or quota) becomes [`Self::DiskFull`].
     pub fn io(path: &std::path::Path, source: std::io::Error) -> Self {
         match source.kind() {
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::DiskFull { path: path.to_path_buf() },
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+                Self::DiskFull { path: path.to_path_buf() }
+            }
             _ => Self::Io { path: path.to_path_buf(), source },
         }
     }

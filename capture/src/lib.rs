@@ -7,9 +7,10 @@
 //! - [`pairing`]: depth and colour of one time to one frame, for devices that send them apart;
 //! - [`Source`]: what live devices, replay and the synthetic sensor have in common;
 //! - [`Recorder`] writes frames to an MCAP file, [`Replay`] is the file as a source; [`depth_codec`] packs depth;
-//! - [`import`](mod@import) reads other people's folders; [`Subject`] is a person's folder with its takes;
-//!   [`inspect`](mod@inspect) says what is in any of them and whether it is healthy;
-//! - [`trajectory`]: poses over time as text; [`atomic_write`](mod@atomic_write): files that appear whole or not at all.
+//! - [`import`](mod@import) reads other people's folders; [`Subject`] is a person's folder with its takes,
+//!   [`LockedSubject`] the same for the one process that may write it; [`inspect`](mod@inspect) says what is in any of
+//!   them and whether it is healthy;
+//! - [`trajectory`]: poses over time as text; [`files`]: files that appear whole or not at all.
 //!
 //! ```
 //! use toile_capture::{DepthImage, DeviceIdentity, Frame, Recorder, RecorderOptions, Replay, Rig, Sensor, Source};
@@ -47,17 +48,18 @@
 //! # }
 //! ```
 
-pub mod atomic_write;
 pub mod clock;
 mod container;
 pub mod depth_codec;
 pub mod error;
+pub mod files;
 pub mod frame;
 pub mod garment_type;
 pub mod import;
 pub mod inspect;
 mod message;
 pub mod pairing;
+mod printable;
 mod protobuf;
 pub mod recording;
 pub mod replay;
@@ -68,16 +70,17 @@ pub mod subject;
 pub mod tick_clock;
 pub mod trajectory;
 
-pub use atomic_write::{atomic_write, atomic_write_with};
 pub use clock::{ClockDomain, ClockFit, host_now_ns};
 pub use error::CaptureError;
+pub use files::{atomic_write, atomic_write_all, atomic_write_with};
 pub use frame::{ColorImage, DepthImage, Frame, RgbImage};
 pub use garment_type::GarmentType;
 pub use inspect::{Inspection, inspect};
+pub use printable::{printable, printable_lines, printable_path};
 pub use recording::{DepthEncoding, Recorder, RecorderOptions, RecordingSummary, export_standard};
 pub use replay::{FrameInfo, Loss, Replay};
 pub use rig::{DeviceIdentity, Rig, Sensor};
 pub use source::Source;
-pub use subject::{Layer, PendingTake, Subject};
+pub use subject::{Layer, LockedSubject, PendingTake, Subject, SubjectLock};
 pub use tick_clock::TickClock;
 pub use trajectory::TimedPose;

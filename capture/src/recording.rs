@@ -7,7 +7,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File},
+    fs::{self, File, TryLockError},
     io::BufWriter,
     path::{Path, PathBuf},
     sync::Arc,
@@ -19,9 +19,8 @@ use mcap::{
 };
 
 use crate::{
-    CaptureError, ColorImage, DepthImage, Frame, RgbImage, Rig,
-    atomic_write::{create_parent, sync_parent, with_suffix},
-    depth_codec,
+    CaptureError, ColorImage, DepthImage, Frame, RgbImage, Rig, depth_codec,
+    files::{claim, create_parent, open_regular, part_path, sync_parent, with_suffix},
     message::{ImageMessage, Stamp, encode_calibration},
     schema::Schema,
 };
@@ -104,13 +103,12 @@ impl Recorder {
             return Err(CaptureError::format(path, "the recording exists already; recordings are never overwritten"));
         }
         create_parent(path)?;
-        let part = with_suffix(path, ".part");
-        if !options.replace_part && part.exists() {
-            let kept = (1_u32..).map(|n| with_suffix(&part, &format!(".{n}"))).find(|kept| !kept.exists());
-            let kept = kept.unwrap_or_else(|| with_suffix(&part, ".kept"));
-            fs::rename(&part, kept).map_err(|error| CaptureError::io(&part, error))?;
+        let part = part_path(path);
+        if !options.replace_part {
+            keep_part(&part)?;
         }
-        let file = File::create(&part).map_err(|error| CaptureError::io(&part, error))?;
+        let file = claim(&part).map_err(|error| CaptureError::io(&part, error))?;
+        let file = file.ok_or_else(|| CaptureError::Busy { path: path.to_path_buf() })?;
         let twin = file.try_clone().map_err(|error| CaptureError::io(&part, error))?;
         let writer = start_writer(file, rig, options.depth).map_err(|error| mcap_error(&part, error))?;
         let (path, rig, channels) = (path.to_path_buf(), rig.clone(), BTreeMap::new());
@@ -330,6 +328,22 @@ pub fn export_standard(path_in: &Path, path_out: &Path) -> Result<RecordingSumma
         recorder.write(&replay.frame(index)?)?;
     }
     recorder.finish()
+}
+
+/// Moves what an interrupted run recorded out of the way.
+fn keep_part(part: &Path) -> Result<(), CaptureError> {
+    let is_recording = fs::symlink_metadata(part).is_ok_and(|found| found.is_file());
+    if !is_recording || is_in_use(part) {
+        return Ok(());
+    }
+    let kept = (1_u32..).map(|n| with_suffix(part, &format!(".{n}"))).find(|kept| !kept.exists());
+    let kept = kept.unwrap_or_else(|| with_suffix(part, ".kept"));
+    fs::rename(part, kept).map_err(|error| CaptureError::io(part, error))
+}
+
+/// True while another process records into a file.
+fn is_in_use(part: &Path) -> bool {
+    open_regular(part).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
 fn check_rig(path: &Path, rig: &Rig) -> Result<(), CaptureError> {

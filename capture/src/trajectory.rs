@@ -7,7 +7,7 @@ use std::{fmt::Write, path::Path};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use toile_geometry::Rigid;
 
-use crate::{CaptureError, atomic_write};
+use crate::{CaptureError, atomic_write, files::read_text};
 
 /// A pose at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +23,7 @@ pub struct TimedPose {
 /// # Errors
 /// [`CaptureError::Io`] where the file cannot be read, [`CaptureError::Format`] with the line that is wrong.
 pub fn read(path: &Path) -> Result<Vec<TimedPose>, CaptureError> {
-    let text = std::fs::read_to_string(path).map_err(|error| CaptureError::io(path, error))?;
+    let text = read_text(path)?;
     parse(&text).map_err(|reason| CaptureError::format(path, reason))
 }
 

@@ -6,9 +6,9 @@ mod common;
 use std::{fs, path::Path};
 
 use common::{image_folder, record_frames, shared};
-use toile_capture::{GarmentType, Recorder, RecorderOptions, Subject, import, inspect};
+use toile_capture::{CaptureError, GarmentType, LockedSubject, Recorder, RecorderOptions, Subject, import, inspect};
 
-fn add(subject: &mut Subject, name: &str, frames: u64) {
+fn add(subject: &mut LockedSubject, name: &str, frames: u64) {
     let take = subject.next_take(name, None).unwrap();
     record_frames(&take.path, frames, 1, 1200);
     assert_eq!(subject.accept(take).unwrap(), None);
@@ -18,13 +18,16 @@ fn add(subject: &mut Subject, name: &str, frames: u64) {
 fn takes_are_numbered_and_come_back() {
     let temp = tempfile::tempdir().unwrap();
     let folder = temp.path().join("deep/maple");
-    let mut subject = Subject::open_or_create(&folder).unwrap();
+    let mut subject = LockedSubject::open_or_create(&folder).unwrap();
     assert!(subject.next_take("trousers", None).unwrap_err().to_string().contains("take 0 is the body"));
     add(&mut subject, "body", 2);
     add(&mut subject, "jeans", 3);
+    let wrong = subject.next_take("99-scarf", None).unwrap_err().to_string();
+    assert!(wrong.contains("the next take is number 2"), "{wrong}");
     add(&mut subject, "02-scarf", 1);
-    let again = Subject::open_or_create(&folder).unwrap();
-    assert_eq!(again, subject);
+    drop(subject);
+    let again = LockedSubject::open_or_create(&folder).unwrap();
+    assert_eq!(*again, Subject::open(&folder).unwrap());
     let labels: Vec<_> = again.layers().iter().map(|layer| layer.label()).collect();
     assert_eq!(labels, ["00-body", "01-jeans", "02-scarf"]);
     let types: Vec<_> = again.layers().iter().map(|layer| layer.garment).collect();
@@ -35,17 +38,18 @@ fn takes_are_numbered_and_come_back() {
     assert!(again.build_folder(layer).ends_with("build/01-jeans"));
     assert!(again.edits_path(layer).ends_with("edits/01-jeans.json"));
     for (name, reason) in
-        [("jeans", "--retake"), ("", "no layer name"), ("../x", "no layer name"), ("Å", "no layer name")]
+        [("jeans", "--retake"), ("", "not a layer name"), ("../x", "not a layer name"), ("Å", "not a layer name")]
     {
         assert!(again.next_take(name, None).unwrap_err().to_string().contains(reason), "{name}");
     }
-    assert!(Subject::create(&folder).unwrap_err().to_string().contains("exists already"));
+    drop(again);
+    assert!(LockedSubject::create(&folder).unwrap_err().to_string().contains("exists already"));
 }
 
 #[test]
 fn a_retake_keeps_the_old_take() {
     let temp = tempfile::tempdir().unwrap();
-    let mut subject = Subject::create(temp.path()).unwrap();
+    let mut subject = LockedSubject::create(temp.path()).unwrap();
     add(&mut subject, "body", 2);
     add(&mut subject, "wrap", 3);
     let path = subject.take_path(&subject.layers()[1]);
@@ -59,41 +63,104 @@ fn a_retake_keeps_the_old_take() {
         assert_eq!(fs::read(kept).unwrap(), old);
         assert_ne!(fs::read(&path).unwrap(), old);
     }
-    let again = Subject::open(temp.path()).unwrap();
+    drop(subject);
+    let mut again = LockedSubject::open(temp.path()).unwrap();
     assert_eq!((again.layers().len(), again.layers()[1].garment), (2, Some(GarmentType::Skirt)));
     assert!(again.retake("hat", None).unwrap_err().to_string().contains("body, wrap"));
     let missing = again.next_take("hat", None).unwrap();
-    assert!(subject.accept(missing).unwrap_err().to_string().contains("not recorded"));
+    assert!(again.accept(missing).unwrap_err().to_string().contains("not recorded"));
+}
+
+/// Does what a program does until it is killed just before it can enter the take.
+fn record_and_be_killed(folder: &Path, name: &str, garment: Option<GarmentType>, retake: bool) {
+    let subject = LockedSubject::open(folder).unwrap();
+    let take = if retake { subject.retake(name, garment) } else { subject.next_take(name, garment) };
+    let mut take = take.unwrap();
+    (take.rig, take.source) = ("three sensors".into(), "/somewhere".into());
+    subject.announce(&take).unwrap();
+    record_frames(&take.path, 2, 1, 4000);
 }
 
 #[test]
-fn a_killed_import_is_completed_on_opening() {
+fn a_take_whose_program_was_killed_keeps_its_type_and_rig() {
     let temp = tempfile::tempdir().unwrap();
-    let mut subject = Subject::create(temp.path()).unwrap();
+    add(&mut LockedSubject::create(temp.path()).unwrap(), "body", 2);
+    record_and_be_killed(temp.path(), "wrap", Some(GarmentType::Skirt), false);
+    let read = Subject::open(temp.path()).unwrap();
+    assert_eq!((read.layers()[1].garment, read.rig()), (Some(GarmentType::Skirt), "three sensors"));
+    assert!(temp.path().join("pending.toml").is_file(), "reading changes nothing");
+    let completed = LockedSubject::open(temp.path()).unwrap();
+    assert_eq!(*completed, read);
+    assert_eq!(completed.completed("wrap", "/somewhere"), Some(&read.layers()[1]), "it need not be imported again");
+    assert_eq!(completed.completed("wrap", "/elsewhere"), None);
+    drop(completed);
+    assert!(!temp.path().join("pending.toml").exists());
+    let later = LockedSubject::open(temp.path()).unwrap();
+    assert_eq!(*later, read);
+    assert_eq!(later.completed("wrap", "/somewhere"), None);
+}
+
+#[test]
+fn a_retake_whose_program_was_killed_is_completed() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut subject = LockedSubject::create(temp.path()).unwrap();
+    add(&mut subject, "body", 2);
+    add(&mut subject, "wrap", 5);
+    drop(subject);
+    record_and_be_killed(temp.path(), "wrap", Some(GarmentType::Dress), true);
+    let path = temp.path().join("takes/01-wrap.mcap");
+    // Once killed before the old take moved away, once after.
+    for rejected in 1..=2 {
+        let completed = LockedSubject::open(temp.path()).unwrap();
+        assert_eq!(completed.layers()[1].garment, Some(GarmentType::Dress));
+        assert!(temp.path().join(format!("takes/rejected/01-wrap.{rejected}.mcap")).is_file());
+        assert!(path.is_file() && !temp.path().join("takes/01-wrap.retake.mcap").exists());
+        drop(completed);
+        record_and_be_killed(temp.path(), "wrap", None, true);
+        fs::rename(&path, temp.path().join("takes/rejected/01-wrap.2.mcap")).unwrap();
+    }
+}
+
+#[test]
+fn takes_that_nobody_noted_are_adopted_and_lost_retakes_are_kept() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut subject = LockedSubject::create(temp.path()).unwrap();
     add(&mut subject, "body", 2);
     record_frames(&subject.next_take("skirt", None).unwrap().path, 2, 1, 4000);
-    let mut reopened = Subject::open(temp.path()).unwrap();
+    drop(subject);
+    let mut reopened = LockedSubject::open(temp.path()).unwrap();
     assert_eq!(reopened.layers()[1].label(), "01-skirt", "recorded, but not yet in subject.toml");
     add(&mut reopened, "coat", 1);
     // One that was recorded, but never accepted, is kept too.
     record_frames(&reopened.retake("skirt", None).unwrap().path, 3, 1, 4000);
     let take = reopened.retake("skirt", None).unwrap();
     assert!(temp.path().join("takes/rejected/01-skirt.1.mcap").is_file() && !take.path.exists());
-    record_frames(&take.path, 4, 1, 4000);
-    let path = reopened.take_path(&take.layer);
-    fs::rename(&path, temp.path().join("takes/moved-away")).unwrap();
-    assert!(Subject::open(temp.path()).is_ok() && path.is_file() && !take.path.exists());
+}
+
+#[test]
+fn one_process_at_a_time_may_write() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path().join("anna");
+    let held = LockedSubject::create(&folder).unwrap();
+    for second in [LockedSubject::open(&folder), LockedSubject::open_or_create(&folder), LockedSubject::create(&folder)]
+    {
+        assert!(matches!(second, Err(CaptureError::Busy { .. })), "{second:?}");
+    }
+    assert!(Subject::open(&folder).is_ok(), "reading needs no lock");
+    held.give_up();
+    assert!(!folder.exists(), "nothing was recorded into it");
 }
 
 #[test]
 fn broken_subjects_get_one_clear_sentence() {
     let temp = tempfile::tempdir().unwrap();
-    assert!(Subject::open(temp.path()).unwrap_err().to_string().contains("is no subject"));
+    assert!(Subject::open(temp.path()).unwrap_err().to_string().contains("is not a subject folder"));
     for (text, expected) in [
         ("name = \"x\"\nlayers = 3\n", "line 2"),
         ("nothing", "line 1"),
         ("date = \"2026-01-01\"\n", "missing field `name`"),
-        ("name = \"x\"\n[[layers]]\nname = \"../../etc\"\n", "`../../etc` is no layer name"),
+        ("name = \"x\"\n[[layers]]\nname = \"../../etc\"\n", "`../../etc` is not a layer name"),
+        ("name = \"x\"\n[[layers]]\nname = \"a\"\n[[layers]]\nname = \"a\"\n", "two layers are called `a`"),
         ("name = \"x\"\n[[layers]]\nname = \"a\"\ntype = \"toga\"\n", "toga"),
     ] {
         fs::write(temp.path().join("subject.toml"), text).unwrap();
@@ -125,7 +192,7 @@ fn inspection_tells_healthy_from_not() {
 #[test]
 fn inspection_of_torn_takes_and_subjects() {
     let temp = tempfile::tempdir().unwrap();
-    let mut subject = Subject::create(&temp.path().join("elm")).unwrap();
+    let mut subject = LockedSubject::create(&temp.path().join("elm")).unwrap();
     add(&mut subject, "body", 4);
     add(&mut subject, "top", 4);
     let path = subject.take_path(&subject.layers()[1]);
@@ -145,7 +212,7 @@ fn inspection_of_torn_takes_and_subjects() {
 fn real_subject_imports_and_is_healthy() {
     let Some(data) = shared("subjects/birch") else { return };
     let temp = tempfile::tempdir().unwrap();
-    let mut subject = Subject::create(&temp.path().join("birch")).unwrap();
+    let mut subject = LockedSubject::create(&temp.path().join("birch")).unwrap();
     for (name, from) in [("body", "00-body"), ("skirt", "01-skirt")] {
         let mut source = import::open(&data.join(from), None).unwrap();
         let take = subject.next_take(name, None).unwrap();

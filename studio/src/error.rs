@@ -106,6 +106,7 @@ impl From<CaptureError> for StudioError {
         match error {
             CaptureError::Io { path, source } => Self::io(&path, source),
             CaptureError::DiskFull { path } => Self::DiskFull { path },
+            CaptureError::Busy { path } => Self::Busy { path },
             other => Self::Capture(other),
         }
     }

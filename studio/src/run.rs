@@ -7,6 +7,7 @@ use std::{
 };
 
 use clap::{Parser, error::ErrorKind};
+use toile_capture::{printable, printable_lines};
 use tracing_subscriber::{EnvFilter, fmt::MakeWriter};
 
 use crate::{
@@ -132,17 +133,18 @@ fn print(command: &str, answer: &Result<Answer, StudioError>, globals: &Globals)
         return say(&document(command, answer));
     }
     match answer {
-        Err(error) => eprintln!("error: {error}"),
+        // Names of files and sensors come from outside: nothing in them may steer the terminal.
+        Err(error) => eprintln!("error: {}", printable_lines(&error.to_string())),
         Ok(answer) => {
             let text = answer.text.trim_end();
             if !text.is_empty() {
-                drop(writeln!(io::stdout(), "{text}"));
+                drop(writeln!(io::stdout(), "{}", printable_lines(text)));
             }
             if !globals.quiet {
-                answer.warnings.iter().for_each(|w| eprintln!("warning: {w}"));
+                answer.warnings.iter().for_each(|w| eprintln!("warning: {}", printable(w)));
             }
-            answer.lost.iter().for_each(|l| eprintln!("lost: {l}"));
-            answer.failures.iter().for_each(|f| eprintln!("failed: {f}"));
+            answer.lost.iter().for_each(|l| eprintln!("lost: {}", printable(l)));
+            answer.failures.iter().for_each(|f| eprintln!("failed: {}", printable(f)));
         }
     }
 }

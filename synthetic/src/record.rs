@@ -15,7 +15,7 @@ pub fn record_subject(
     folder: &Path,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Vec<RecordingSummary>, SyntheticError> {
-    let mut entry = toile_capture::Subject::create(folder)?;
+    let mut entry = toile_capture::LockedSubject::create(folder)?;
     let mut summaries = Vec::new();
     for n in 0..subject.take_count() {
         let take = subject.take(n)?;

@@ -7,12 +7,11 @@ use std::{
 
 use serde_json::json;
 use signal_hook::{consts::SIGINT, flag};
-use toile_capture::{GarmentType, PendingTake, Source, Subject};
+use toile_capture::{GarmentType, LockedSubject, PendingTake, Source, Subject, printable_path};
 
 use crate::{
     StudioError,
     capture::{Device, Pace, Recorded, RigFile, Stop, record},
-    commands::import::remove_empty,
     outcome::Answer,
     run::Session,
 };
@@ -68,13 +67,14 @@ impl Capture {
         if self.seconds.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
             return Err(StudioError::Usage("--seconds must be above 0".into()));
         }
-        let is_new = !Subject::exists(&self.subject);
-        let mut subject = Subject::open_or_create(&self.subject)?;
-        let captured = self.capture(&mut subject, session);
-        if captured.is_err() && is_new {
-            remove_empty(&self.subject);
-        }
-        let (recorded, take, kept) = captured?;
+        let mut subject = LockedSubject::open_or_create(&self.subject)?;
+        let (recorded, take, kept) = match self.capture(&mut subject, session) {
+            Ok(captured) => captured,
+            Err(error) => {
+                subject.give_up();
+                return Err(error);
+            }
+        };
         let mut answer = self.answer(&recorded, &take, kept);
         answer.lost.extend(match &self.rig {
             Some(file) => RigFile::read(file)?.damage()?,
@@ -85,10 +85,10 @@ impl Capture {
 
     fn capture(
         &self,
-        subject: &mut Subject,
+        subject: &mut LockedSubject,
         session: &Session,
     ) -> Result<(Recorded, PathBuf, Option<PathBuf>), StudioError> {
-        let pending: PendingTake = if self.retake {
+        let mut pending: PendingTake = if self.retake {
             subject.retake(&self.layer, self.garment)?
         } else {
             subject.next_take(&self.layer, self.garment)?
@@ -96,7 +96,8 @@ impl Capture {
         let (source, pace) = self.open(subject, &pending)?;
         let mut models: Vec<String> = source.rig().sensors.iter().map(|s| s.identity.model.clone()).collect();
         models.dedup();
-        let model = models.join(", ");
+        pending.rig = models.join(", ");
+        subject.announce(&pending)?;
         session.progress.plan(1.0);
         session.progress.begin(&format!("{}: capture", pending.layer.label()), 1.0);
         let stop = self.seconds.map_or(Stop::AfterOneTurn, Stop::After);
@@ -105,9 +106,6 @@ impl Capture {
         let recorded = record(source, &pending.path, how, &pressed, &session.progress)?;
         let take = subject.take_path(&pending.layer);
         let kept = subject.accept(pending)?;
-        if subject.rig().is_empty() {
-            subject.set_rig(&model)?;
-        }
         session.progress.end();
         Ok((recorded, take, kept))
     }
@@ -125,9 +123,10 @@ impl Capture {
     fn answer(&self, recorded: &Recorded, take: &Path, kept: Option<PathBuf>) -> Answer {
         let Recorded { frames, bytes, lost, unpaired, broken, failed, seen } = recorded;
         let (angle, unseen) = (seen.turn.angle().to_degrees(), seen.turn.unseen());
-        let mut text = format!("{}: {frames} frames, turned {angle:.0}°\n", take.display());
+        let (take, kept) = (printable_path(take), kept.as_deref().map(printable_path));
+        let mut text = format!("{take}: {frames} frames, turned {angle:.0}°\n");
         if let Some(kept) = &kept {
-            text.push_str(&format!("the old take is kept as {}\n", kept.display()));
+            text.push_str(&format!("the old take is kept as {kept}\n"));
         }
         let mut warnings = Vec::new();
         if let Some(failed) = failed {

@@ -1,19 +1,16 @@
 //! `toile import`: a recorded folder as a subject's next take.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use toile_capture::{
-    GarmentType, PendingTake, Recorder, RecorderOptions, Replay, Subject,
+    GarmentType, LockedSubject, PendingTake, Recorder, RecorderOptions, Replay,
+    files::part_path,
     import::{self, Format, ImportReport},
+    printable_path,
 };
 
-use crate::{
-    StudioError, commands::must_exist, disk::part_path, outcome::Answer, pipeline::opened::Opened, run::Session,
-};
+use crate::{StudioError, commands::must_exist, outcome::Answer, pipeline::opened::Opened, run::Session};
 
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
@@ -55,38 +52,46 @@ impl Import {
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         must_exist(&self.folder)?;
         let mut opened = Opened::new(&self.folder, self.format)?;
-        let is_new = !Subject::exists(&self.subject);
-        let mut subject = Subject::open_or_create(&self.subject)?;
-        let imported = self.import(&mut opened, &mut subject, session);
-        if imported.is_err() && is_new {
-            remove_empty(&self.subject);
+        let mut subject = LockedSubject::open_or_create(&self.subject)?;
+        if let Some(answer) = self.completed(&subject) {
+            return Ok(answer);
         }
-        let (report, take, kept) = imported?;
-        if subject.rig().is_empty()
-            && let Some(sensor) = opened.source.rig().sensors.first()
-        {
-            subject.set_rig(&sensor.identity.model.clone())?;
+        match self.import(&mut opened, &mut subject, session) {
+            Ok((report, take, kept)) => Ok(self.answer(opened.lost, &report, &take, kept)),
+            Err(error) => {
+                subject.give_up();
+                Err(error)
+            }
         }
-        Ok(self.answer(opened.lost, &report, &take, kept))
+    }
+
+    /// The answer where an earlier run of this very command recorded the take, but was killed before it could say so.
+    fn completed(&self, subject: &LockedSubject) -> Option<Answer> {
+        let layer = subject.completed(&self.layer, &source_name(&self.folder)).filter(|_| !self.retake)?;
+        let take = subject.take_path(layer);
+        let shown = printable_path(&take);
+        let frames = Replay::open(&take).ok()?.len();
+        let text = format!("{shown}: {frames} frames; an earlier run had recorded them and was interrupted\n");
+        Some(Answer { text, results: json!({ "take": shown, "frames": frames }), ..Answer::default() })
     }
 
     fn import(
         &self,
         opened: &mut Opened,
-        subject: &mut Subject,
+        subject: &mut LockedSubject,
         session: &Session,
     ) -> Result<(ImportReport, PathBuf, Option<PathBuf>), StudioError> {
-        let pending: PendingTake = if self.retake {
+        let mut pending: PendingTake = if self.retake {
             subject.retake(&self.layer, self.garment)?
         } else {
             subject.next_take(&self.layer, self.garment)?
         };
+        pending.rig = opened.source.rig().sensors.first().map_or_else(String::new, |s| s.identity.model.clone());
+        pending.source = source_name(&self.folder);
+        subject.announce(&pending)?;
         session.progress.plan(1.0);
         session.progress.begin(&format!("{}: import", pending.layer.label()), 1.0);
-        let report = record(opened, &pending.path, session).inspect_err(|_| {
-            // An import can be repeated, so what is half written is of no use.
-            drop(fs::remove_file(part_path(&pending.path)));
-        })?;
+        let report = record(opened, &pending.path, session)?;
         let take = subject.take_path(&pending.layer);
         let kept = subject.accept(pending)?;
         session.progress.end();
@@ -98,11 +103,12 @@ impl Import {
         if !report.is_complete() {
             let missing = missing_numbers(take);
             let numbers = if missing.is_empty() { String::new() } else { format!(" ({})", missing.join(", ")) };
-            lost.push(format!("{}: {report}{numbers}; everything else is in the take", self.folder.display()));
+            lost.push(format!("{}: {report}{numbers}; everything else is in the take", printable_path(&self.folder)));
         }
-        let mut text = format!("{}: {} frames\n", take.display(), report.frames);
+        let (take, kept) = (printable_path(take), kept.as_deref().map(printable_path));
+        let mut text = format!("{take}: {} frames\n", report.frames);
         if let Some(kept) = &kept {
-            text.push_str(&format!("the old take is kept as {}\n", kept.display()));
+            text.push_str(&format!("the old take is kept as {kept}\n"));
         }
         Answer { text, results: json!({ "take": take, "report": report, "kept": kept }), lost, ..Answer::default() }
     }
@@ -115,8 +121,9 @@ fn missing_numbers(take: &Path) -> Vec<String> {
     let mut missing = Vec::new();
     for pair in frames.windows(2) {
         let (before, after, lost) = (pair[0].device_frame, pair[1].device_frame, u64::from(pair[1].lost_before));
-        let step = after.saturating_sub(before) / (lost + 1);
-        missing.extend((1..=lost).map(|k| (before + k * step).to_string()));
+        let step = after.saturating_sub(before) / lost.saturating_add(1);
+        let numbers = (1..=lost).map_while(|k| before.checked_add(k.checked_mul(step)?));
+        missing.extend(numbers.take(NAMED + 1).map(|number| number.to_string()));
     }
     if missing.len() > NAMED {
         missing.truncate(NAMED);
@@ -125,21 +132,20 @@ fn missing_numbers(take: &Path) -> Vec<String> {
     missing
 }
 
-/// So many missing frames are named.
+/// At most this many missing frames are named.
 const NAMED: usize = 12;
 
 fn record(opened: &mut Opened, path: &Path, session: &Session) -> Result<ImportReport, StudioError> {
     let options = RecorderOptions { replace_part: true, ..RecorderOptions::default() };
     let recorder = Recorder::create(path, opened.source.rig(), options)?;
-    Ok(import::record(opened.source.as_mut(), recorder, &|x| session.progress.at(x))?)
+    let copied = import::record(opened.source.as_mut(), recorder, &|x| session.progress.at(x));
+    Ok(copied.inspect_err(|_| {
+        // An import can be repeated, so a half-written recording is of no use.
+        drop(std::fs::remove_file(part_path(path)));
+    })?)
 }
 
-/// Takes back a subject that was created for a take that did not come; folders that hold anything stay.
-pub(crate) fn remove_empty(subject: &Path) {
-    let has_takes = fs::read_dir(subject.join("takes")).is_ok_and(|mut entries| entries.next().is_some());
-    if !has_takes {
-        drop(fs::remove_file(subject.join("subject.toml")));
-        drop(fs::remove_dir(subject.join("takes")));
-        drop(fs::remove_dir(subject));
-    }
+/// The folder that is imported, as an interrupted import remembers it.
+fn source_name(folder: &Path) -> String {
+    std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf()).to_string_lossy().into_owned()
 }

@@ -1,11 +1,11 @@
 //! One run over one subject.
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs,
     path::{Path, PathBuf},
 };
 
-use toile_capture::Subject;
+use toile_capture::LockedSubject;
 use toile_garments::GarmentType;
 use toile_geometry::{Mesh, obj, ply};
 
@@ -23,11 +23,10 @@ pub struct Run<'a> {
     /// Where progress is shown.
     pub progress: &'a Progress,
     /// The subject, or `None` for a single recording or scan.
-    pub subject: Option<Subject>,
+    /// Locked: nothing else writes into the subject's folder meanwhile.
+    pub subject: Option<LockedSubject>,
     name: String,
     left_out: Vec<String>,
-    /// Held open: no other run works on the subject meanwhile.
-    _lock: Option<File>,
 }
 
 impl<'a> Run<'a> {
@@ -36,7 +35,7 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`StudioError`] where there is no subject, it has no such layer, or another run works on it.
     pub fn open(root: &Path, last: Option<&str>, progress: &'a Progress) -> Result<Self, StudioError> {
-        let subject = Subject::open(root)?;
+        let subject = LockedSubject::open(root)?;
         let mut layers: Vec<String> = subject.layers().iter().map(|l| l.label()).collect();
         if layers.is_empty() {
             let reason =
@@ -51,15 +50,14 @@ impl<'a> Run<'a> {
             layers.truncate(count + 1);
         }
         let name = subject.name().to_string();
-        let lock = lock(root)?;
         let folders = Folders::new(root);
-        Ok(Self { folders, layers, progress, subject: Some(subject), name, left_out: Vec::new(), _lock: lock })
+        Ok(Self { folders, layers, progress, subject: Some(subject), name, left_out: Vec::new() })
     }
 
     /// Over a single file; records name paths relative to `root`.
     pub fn single(root: &Path, name: &str, progress: &'a Progress) -> Self {
         let (folders, name) = (Folders::new(root), name.to_string());
-        Self { folders, layers: Vec::new(), progress, subject: None, name, left_out: Vec::new(), _lock: None }
+        Self { folders, layers: Vec::new(), progress, subject: None, name, left_out: Vec::new() }
     }
 
     /// Tells the progress what lies ahead.
@@ -143,29 +141,5 @@ impl<'a> Run<'a> {
     pub fn read_mesh(&self, path: &Path) -> Result<Mesh, StudioError> {
         let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
         Ok(if is_obj { obj::read(path)? } else { ply::read(path)? })
-    }
-}
-
-/// Locks the subject's folder until the file is dropped; `None` where the file system knows no locks.
-fn lock(root: &Path) -> Result<Option<File>, StudioError> {
-    let folder = File::open(root).map_err(|e| StudioError::io(root, e))?;
-    match folder.try_lock() {
-        Ok(()) => Ok(Some(folder)),
-        Err(TryLockError::WouldBlock) => Err(StudioError::Busy { path: root.to_path_buf() }),
-        Err(TryLockError::Error(_)) => Ok(None),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_subject_is_worked_on_by_one_run_at_a_time() {
-        let dir = tempfile::tempdir().unwrap();
-        let first = lock(dir.path()).unwrap();
-        assert!(matches!(lock(dir.path()), Err(StudioError::Busy { .. })));
-        drop(first);
-        assert!(lock(dir.path()).is_ok());
     }
 }

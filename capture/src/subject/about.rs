@@ -1,0 +1,69 @@
+//! `subject.toml`.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::layer::{Layer, check_name};
+use crate::{
+    CaptureError,
+    files::{atomic_write, read_text},
+};
+
+/// What `subject.toml` says.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(super) struct About {
+    pub(super) name: String,
+    #[serde(default)]
+    pub(super) date: String,
+    #[serde(default)]
+    pub(super) rig: String,
+    #[serde(default)]
+    pub(super) notes: String,
+    #[serde(default)]
+    pub(super) layers: Vec<Layer>,
+}
+
+impl About {
+    /// Reads the file of a subject's folder.
+    pub(super) fn read(folder: &Path) -> Result<Self, CaptureError> {
+        let path = path(folder);
+        if !path.exists() {
+            return Err(CaptureError::format(folder, "is not a subject folder: it has no subject.toml"));
+        }
+        Self::parse(&read_text(&path)?).map_err(|reason| CaptureError::format(&path, reason))
+    }
+
+    /// Reads the file's text; layers get their numbers.
+    pub(super) fn parse(text: &str) -> Result<Self, String> {
+        let mut about: Self = parse_toml(text)?;
+        about.layers.iter_mut().enumerate().for_each(|(number, layer)| layer.number = number);
+        for (number, layer) in about.layers.iter().enumerate() {
+            check_name(&layer.name)?;
+            if about.layers[..number].iter().any(|other| other.name == layer.name) {
+                return Err(format!("two layers are called `{}`; every layer needs a name of its own", layer.name));
+            }
+        }
+        Ok(about)
+    }
+
+    /// Writes the file, whole or not at all.
+    pub(super) fn write(&self, folder: &Path) -> Result<(), CaptureError> {
+        let path = path(folder);
+        let text = toml::to_string(self).map_err(|error| CaptureError::format(&path, error.to_string()))?;
+        atomic_write(&path, text.as_bytes())
+    }
+}
+
+/// Where the file stands.
+pub(super) fn path(folder: &Path) -> PathBuf {
+    folder.join("subject.toml")
+}
+
+/// Reads TOML; the error names the line.
+pub(super) fn parse_toml<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
+    toml::from_str(text).map_err(|error| {
+        let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or("");
+        format!("line {}: {}", 1 + before.matches('\n').count(), error.message().replace('\n', "; "))
+    })
+}

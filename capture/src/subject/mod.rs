@@ -1,0 +1,28 @@
+//! A subject on disk: one person at one visit.
+//!
+//! ```text
+//! SUBJECT/
+//!   subject.toml                 name, date, rig, the layers in order with their types, notes
+//!   pending.toml                 which take is being recorded; only while that lasts
+//!   takes/00-body.mcap           one recording a take; never changed after it is closed
+//!   takes/rejected/              takes that were replaced
+//!   edits/01-trousers.json       corrections by hand
+//!   build/                       everything in here can be deleted and built again
+//! ```
+//!
+//! [`Subject`] reads; [`LockedSubject`] also writes, and only one process at a time can have it. Whatever writes into a
+//! subject's folder without changing its takes (stages, edits) holds a [`SubjectLock`].
+
+mod about;
+mod date;
+mod layer;
+mod lock;
+mod locked;
+mod pending;
+mod reading;
+
+pub use layer::{BODY, Layer};
+pub use lock::SubjectLock;
+pub use locked::LockedSubject;
+pub use pending::PendingTake;
+pub use reading::Subject;

@@ -1,0 +1,125 @@
+//! A subject as it is read.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    about::{self, About},
+    layer::{Layer, check_name},
+    pending::Note,
+};
+use crate::CaptureError;
+
+/// A subject's folder. Reading it changes nothing on disk; [`LockedSubject`](super::LockedSubject) can write.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Subject {
+    pub(super) folder: PathBuf,
+    pub(super) about: About,
+}
+
+impl Subject {
+    /// Opens a subject. A take that was recorded but not yet entered in `subject.toml` when the program was killed
+    /// counts as one of its takes.
+    ///
+    /// # Errors
+    /// [`CaptureError`] where the folder is not a subject or its `subject.toml` is not readable.
+    pub fn open(folder: &Path) -> Result<Self, CaptureError> {
+        let mut subject = Self { folder: folder.to_path_buf(), about: About::read(folder)? };
+        subject.adopt_takes();
+        Ok(subject)
+    }
+
+    /// True where a folder is a subject.
+    pub fn exists(folder: &Path) -> bool {
+        about::path(folder).is_file()
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The subject's name.
+    pub fn name(&self) -> &str {
+        &self.about.name
+    }
+
+    /// Date of the visit, `YYYY-MM-DD`.
+    pub fn date(&self) -> &str {
+        &self.about.date
+    }
+
+    /// What the rig is called; empty until it is known.
+    pub fn rig(&self) -> &str {
+        &self.about.rig
+    }
+
+    /// Free text.
+    pub fn notes(&self) -> &str {
+        &self.about.notes
+    }
+
+    /// The layers in the order of their takes.
+    pub fn layers(&self) -> &[Layer] {
+        &self.about.layers
+    }
+
+    /// The layer of that name (with or without its number).
+    pub fn layer(&self, name: &str) -> Option<&Layer> {
+        self.about.layers.iter().find(|layer| layer.name == name || layer.label() == name)
+    }
+
+    /// `takes/NN-name.mcap`.
+    pub fn take_path(&self, layer: &Layer) -> PathBuf {
+        self.takes_folder().join(format!("{}.mcap", layer.label()))
+    }
+
+    /// `edits/NN-name.json`.
+    pub fn edits_path(&self, layer: &Layer) -> PathBuf {
+        self.folder.join("edits").join(format!("{}.json", layer.label()))
+    }
+
+    /// `build/`.
+    pub fn build_path(&self) -> PathBuf {
+        self.folder.join("build")
+    }
+
+    /// `build/NN-name/`.
+    pub fn build_folder(&self, layer: &Layer) -> PathBuf {
+        self.build_path().join(layer.label())
+    }
+
+    pub(super) fn takes_folder(&self) -> PathBuf {
+        self.folder.join("takes")
+    }
+
+    /// Where a new take of an existing layer is recorded to.
+    pub(super) fn retake_path(&self, layer: &Layer) -> PathBuf {
+        self.takes_folder().join(format!("{}.retake.mcap", layer.label()))
+    }
+
+    /// Enters recordings that no layer has yet: the one that `pending.toml` tells of with its type, others by name.
+    fn adopt_takes(&mut self) {
+        let note = Note::read(&self.folder).filter(|note| !note.retake);
+        while let Some(name) = self.recorded_name(self.about.layers.len()) {
+            let number = self.about.layers.len();
+            let noted = note.as_ref().filter(|note| note.number == number && note.layer.name == name);
+            if let Some(note) = noted.filter(|_| self.about.rig.is_empty()) {
+                self.about.rig = note.rig.clone();
+            }
+            self.about.layers.push(noted.map_or_else(|| Layer::new(number, &name, None), |note| note.layer.clone()));
+        }
+    }
+
+    /// The layer name of the recording `takes/NN-name.mcap` of that number; the first by name where there are several.
+    fn recorded_name(&self, number: usize) -> Option<String> {
+        let prefix = format!("{number:02}-");
+        let name_of = |file: String| Some(file.strip_suffix(".mcap")?.strip_prefix(&prefix)?.to_string());
+        let files = fs::read_dir(self.takes_folder()).ok()?.flatten();
+        let names = files.filter_map(|file| file.file_name().into_string().ok()).filter_map(name_of);
+        let free = |name: &String| check_name(name).is_ok() && self.layer(name).is_none();
+        names.filter(free).min()
+    }
+}
