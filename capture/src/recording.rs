@@ -149,6 +149,11 @@ impl Recorder {
         if self.pending >= self.options.chunk_bytes { self.close_chunk() } else { Ok(()) }
     }
 
+    /// The file that grows until [`Self::finish`].
+    pub fn part_path(&self) -> &Path {
+        &self.part
+    }
+
     /// Closes the file, syncs it and gives it its final name.
     ///
     /// # Errors

@@ -1,8 +1,8 @@
 //! The command line: what can be asked, and in which words.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
-use crate::commands;
+use crate::{commands, session::Globals};
 
 const AFTER: &str = "\
 The usual way, from recordings to a dressed avatar:
@@ -27,23 +27,6 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
-}
-
-/// What every command takes.
-#[derive(Debug, Clone, Args)]
-pub struct Globals {
-    /// Processor threads to use (0: as many as the machine has). The result is the same for any number
-    #[arg(long, global = true, default_value_t = 0, value_name = "N")]
-    pub threads: usize,
-    /// Print one JSON document with the results (or the error) instead of text
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// No progress, no warnings on standard error
-    #[arg(long, short, global = true, conflicts_with = "verbose")]
-    pub quiet: bool,
-    /// Say more (-vv: everything)
-    #[arg(long, short, global = true, action = clap::ArgAction::Count)]
-    pub verbose: u8,
 }
 
 /// The commands.

@@ -1,14 +1,11 @@
-//! The `toile` program: command line, pipeline, reports.
+//! The `toile` program: a command line over the stages and the cameras.
 //!
-//! No algorithm lives here. The stages' crates take values and return values; this crate reads what they need from a
-//! subject's folder, hands it over, and writes what they give back, whole or not at all:
+//! No algorithm lives here. [`toile_pipeline`] takes a subject's folder from recordings to an avatar; [`toile_live`]
+//! records; this crate says what can be asked, asks it, and prints the answer:
 //!
-//! - [`cli`], [`commands`]: what can be asked;
-//! - [`pipeline`]: the stages in their order, each a file with what it reads and writes;
-//! - [`capture`](mod@capture): recording from a camera;
-//! - [`stage`]: a stage is skipped when its inputs, settings and version are what its record says;
-//! - [`report`]: the page that an operator reads;
-//! - [`outcome`]: how a command ended; `main` alone turns that into an exit code.
+//! - `cli`, `commands`: what can be asked, and in which words;
+//! - `run`: one run of the program, words in, answer out;
+//! - [`Outcome`]: how a command ended; `main` alone turns that into an exit code.
 //!
 //! ```
 //! use toile_studio::{Outcome, run};
@@ -16,21 +13,14 @@
 //! assert_eq!(run(words), Outcome::Done);
 //! ```
 
-pub mod capture;
-pub mod cli;
-pub mod commands;
-pub mod disk;
-pub mod error;
-pub mod hash;
-pub mod memory;
-pub mod outcome;
-pub mod pipeline;
-pub mod progress;
-pub mod report;
-pub mod run;
-pub mod stage;
+mod cli;
+mod commands;
+mod error;
+mod outcome;
+mod progress;
+mod run;
+mod session;
 
 pub use error::StudioError;
 pub use outcome::Outcome;
-pub use progress::Progress;
 pub use run::run;

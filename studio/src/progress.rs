@@ -7,6 +7,8 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
+use toile_live::Status;
+use toile_pipeline::Observer;
 
 /// Without a terminal a running step says a line at most this often.
 const LINE_EVERY: Duration = Duration::from_secs(5);
@@ -49,46 +51,12 @@ impl Progress {
         Self { view, state: Mutex::new(state) }
     }
 
-    /// Adds steps of `cost` to what lies ahead.
-    pub fn plan(&self, cost: f64) {
-        self.state().ahead += cost;
-    }
-
-    /// A planned step of `cost` need not run.
-    pub fn skip(&self, cost: f64) {
+    /// Shows how the take that is being recorded stands.
+    pub fn show_take(&self, status: &Status) {
         let mut state = self.state();
-        state.ahead = (state.ahead - cost).max(0.0);
-    }
-
-    /// Begins a planned step.
-    pub fn begin(&self, label: &str, cost: f64) {
-        let mut state = self.state();
-        (state.label, state.step, state.fraction) = (label.to_string(), cost, 0.0);
-        state.ahead = state.ahead.max(cost);
-        self.show(&mut state, true);
-    }
-
-    /// Tells how far the running step is, 0 to 1. May be called from any thread.
-    pub fn at(&self, fraction: f32) {
-        let mut state = self.state();
-        state.fraction = f64::from(fraction).clamp(state.fraction, 1.0);
+        state.label = status.to_string();
+        state.fraction = status.share.clamp(state.fraction, 1.0);
         self.show(&mut state, false);
-    }
-
-    /// Tells what the running step sees, and how far it is.
-    pub fn tell(&self, label: &str, fraction: f32) {
-        let mut state = self.state();
-        state.label = label.to_string();
-        state.fraction = f64::from(fraction).clamp(state.fraction, 1.0);
-        self.show(&mut state, false);
-    }
-
-    /// Ends the running step.
-    pub fn end(&self) {
-        let mut state = self.state();
-        state.ahead = (state.ahead - state.step).max(0.0);
-        state.done += state.step;
-        (state.step, state.fraction) = (0.0, 0.0);
     }
 
     /// Says a line without disturbing the bar.
@@ -129,6 +97,37 @@ impl Progress {
                 }
             }
         }
+    }
+}
+
+impl Observer for Progress {
+    fn plan(&self, cost: f64) {
+        self.state().ahead += cost;
+    }
+
+    fn skip(&self, cost: f64) {
+        let mut state = self.state();
+        state.ahead = (state.ahead - cost).max(0.0);
+    }
+
+    fn begin(&self, label: &str, cost: f64) {
+        let mut state = self.state();
+        (state.label, state.step, state.fraction) = (label.to_string(), cost, 0.0);
+        state.ahead = state.ahead.max(cost);
+        self.show(&mut state, true);
+    }
+
+    fn at(&self, fraction: f32) {
+        let mut state = self.state();
+        state.fraction = f64::from(fraction).clamp(state.fraction, 1.0);
+        self.show(&mut state, false);
+    }
+
+    fn end(&self) {
+        let mut state = self.state();
+        state.ahead = (state.ahead - state.step).max(0.0);
+        state.done += state.step;
+        (state.step, state.fraction) = (0.0, 0.0);
     }
 }
 

@@ -6,27 +6,21 @@ use std::{
     sync::Arc,
 };
 
-use clap::{Parser, error::ErrorKind};
+use clap::{CommandFactory, Parser, error::ErrorKind};
 use toile_capture::{printable, printable_lines};
+use toile_pipeline::stage;
 use tracing_subscriber::{EnvFilter, fmt::MakeWriter};
 
 use crate::{
-    Outcome, Progress, StudioError,
-    cli::{Cli, Command, Globals},
+    Outcome, StudioError,
+    cli::{Cli, Command},
     outcome::{Answer, document},
-    stage,
+    progress::Progress,
+    session::{Globals, Session},
 };
 
 /// More threads than any machine that this runs on has processors.
 const MOST_THREADS: usize = 1024;
-
-/// What every command is given.
-pub struct Session {
-    /// The options that every command takes.
-    pub globals: Globals,
-    /// Where progress is shown.
-    pub progress: Arc<Progress>,
-}
 
 /// Parses the command line, does what it says, and prints the answer.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> Outcome {
@@ -59,7 +53,7 @@ impl Command {
             Self::Demo(c) => c.run(session),
             Self::Synthesize(c) => c.run(session),
             Self::Devices(c) => c.run(session),
-            Self::Completions(c) => c.run(),
+            Self::Completions(c) => Ok(c.run(Cli::command())),
         }
     }
 

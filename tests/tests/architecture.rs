@@ -25,6 +25,36 @@ const MAY_IMPORT: &[(&str, &[&str])] = &[
     ("toile-driver-uvc-depth", &["toile-geometry", "toile-capture", "toile-driver-transport"]),
     ("toile-driver-webcam", &["toile-geometry", "toile-capture"]),
     ("v4l2-sys-mit", &[]),
+    (
+        "toile-pipeline",
+        &[
+            "toile-geometry",
+            "toile-capture",
+            "toile-fusion",
+            "toile-character",
+            "toile-fitting",
+            "toile-garments",
+            "toile-animation",
+            "toile-avatar",
+            "toile-render",
+        ],
+    ),
+    (
+        "toile-live",
+        &[
+            "toile-geometry",
+            "toile-capture",
+            "toile-fusion",
+            "toile-synthetic",
+            "toile-driver-kinect1",
+            "toile-driver-kinect2",
+            "toile-driver-realsense",
+            "toile-driver-stereo",
+            "toile-driver-synthetic",
+            "toile-driver-transport",
+            "toile-driver-uvc-depth",
+        ],
+    ),
 ];
 
 /// Crates that bring everything together and may import all others.

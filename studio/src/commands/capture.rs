@@ -8,13 +8,10 @@ use std::{
 use serde_json::json;
 use signal_hook::{consts::SIGINT, flag};
 use toile_capture::{GarmentType, LockedSubject, PendingTake, Source, Subject, printable_path};
+use toile_live::{Device, Pace, Recorded, RigFile, Stop, record};
+use toile_pipeline::Observer;
 
-use crate::{
-    StudioError,
-    capture::{Device, Pace, Recorded, RigFile, Stop, record},
-    outcome::Answer,
-    run::Session,
-};
+use crate::{StudioError, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
@@ -103,7 +100,7 @@ impl Capture {
         let stop = self.seconds.map_or(Stop::AfterOneTurn, Stop::After);
         let how = (stop, pace);
         let pressed = interrupted()?;
-        let recorded = record(source, &pending.path, how, &pressed, &session.progress)?;
+        let recorded = record(source, &pending.path, how, &pressed, &mut |status| session.progress.show_take(status))?;
         let take = subject.take_path(&pending.layer);
         let kept = subject.accept(pending)?;
         session.progress.end();

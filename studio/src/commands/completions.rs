@@ -1,9 +1,8 @@
 //! `toile completions`: completions for a shell.
 
-use clap::CommandFactory;
 use serde_json::json;
 
-use crate::{StudioError, cli::Cli, outcome::Answer};
+use crate::outcome::Answer;
 
 const AFTER: &str = "\
 Examples:
@@ -19,14 +18,11 @@ pub struct Completions {
 }
 
 impl Completions {
-    /// Runs the command.
-    ///
-    /// # Errors
-    /// None.
-    pub fn run(&self) -> Result<Answer, StudioError> {
+    /// Completions for the whole command line `of`.
+    pub fn run(&self, mut of: clap::Command) -> Answer {
         let mut bytes = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "toile", &mut bytes);
+        clap_complete::generate(self.shell, &mut of, "toile", &mut bytes);
         let text = String::from_utf8_lossy(&bytes).into_owned();
-        Ok(Answer { results: json!({ "script": text }), text, ..Answer::default() })
+        Answer { results: json!({ "script": text }), text, ..Answer::default() }
     }
 }

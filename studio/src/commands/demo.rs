@@ -4,8 +4,9 @@ use std::{
     fs,
     path::{Path, PathBuf},
 };
+use toile_pipeline::{Options, disk};
 
-use crate::{StudioError, commands::process, disk, outcome::Answer, pipeline::Options, run::Session};
+use crate::{StudioError, commands::process, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 Copies the session of recorded/ to demo/ beside it, processes it, and says where to look.
@@ -89,5 +90,5 @@ fn copy(from: &Path, to: &Path) -> Result<(), StudioError> {
         return Ok(());
     }
     let bytes = fs::read(from).map_err(|e| StudioError::io(from, e))?;
-    if fs::read(to).is_ok_and(|old| old == bytes) { Ok(()) } else { disk::write_whole(to, &bytes) }
+    if fs::read(to).is_ok_and(|old| old == bytes) { Ok(()) } else { Ok(disk::write_whole(to, &bytes)?) }
 }

@@ -18,7 +18,7 @@ use toile_driver_transport::{
 use toile_driver_uvc_depth::nodes::{self, DepthNode};
 use toile_driver_webcam as webcam;
 
-use crate::{StudioError, outcome::Answer, run::Session};
+use crate::{StudioError, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 `toile capture` records from both Kinects, RealSense D4xx, UVC depth cameras (Z16, Y16) and stereo rigs.

@@ -6,15 +6,13 @@ use std::{
 };
 
 use toile_garments::Edits;
+use toile_pipeline::{Goal, Options, Run, disk, process, stage::pretty, steps::cut::read_edits};
 
 use crate::{
     StudioError,
-    commands::{must_exist, reach},
-    disk,
+    commands::reach::{must_exist, reach},
     outcome::Answer,
-    pipeline::{self, Goal, Options, Run, cut::read_edits},
-    run::Session,
-    stage::pretty,
+    session::Session,
 };
 
 const AFTER: &str = "\
@@ -59,14 +57,14 @@ impl Edit {
         must_exist(&self.subject)?;
         let edits = self.strokes.as_deref().map(|file| read_edits(file).map(|e| (file, e))).transpose()?;
         let options = Options { last_layer: Some(self.layer.clone()), ..Options::default() };
-        pipeline::process(&self.subject, Goal::Scans, &options, &session.progress)?;
+        process(&self.subject, Goal::Scans, &options, session.progress.as_ref())?;
         self.store(edits, session)?;
         reach(&self.subject, Goal::Garments, &Options::default(), session)
     }
 
     /// Puts the edits where the layer's rebuild finds them.
     fn store(&self, edits: Option<(&Path, Edits)>, session: &Session) -> Result<(), StudioError> {
-        let run = Run::open(&self.subject, Some(&self.layer), &session.progress)?;
+        let run = Run::open(&self.subject, Some(&self.layer), session.progress.as_ref())?;
         let layer = run.layers.last().map_or("", String::as_str);
         if layer == run.first_layer() {
             return Err(StudioError::Usage(format!("{layer} is the body: only garments have edits")));
@@ -83,6 +81,6 @@ impl Edit {
             edits.hems.extend(hems);
             edits.check().map_err(|e| StudioError::format(file, format!("together with {}: {e}", path.display())))?;
         }
-        disk::write_whole(&path, &pretty(&edits)?)
+        Ok(disk::write_whole(&path, &pretty(&edits)?)?)
     }
 }

@@ -9,14 +9,13 @@ use serde_json::{Value, json};
 use toile_capture::{Replay, export_standard};
 use toile_character::JointNaming;
 use toile_garments::CullSettings;
+use toile_pipeline::{Goal, Options, disk};
 
 use crate::{
     StudioError,
-    commands::{must_exist, reach},
-    disk,
+    commands::reach::{must_exist, reach},
     outcome::Answer,
-    pipeline::{Goal, Options},
-    run::Session,
+    session::Session,
 };
 
 const AFTER: &str = "\

@@ -1,13 +1,13 @@
 //! `toile extract`: the garments out of the dressed scans.
 
 use std::path::PathBuf;
+use toile_pipeline::{Goal, Options};
 
 use crate::{
     StudioError,
-    commands::{must_exist, reach},
+    commands::reach::{must_exist, reach},
     outcome::Answer,
-    pipeline::{Goal, Options},
-    run::Session,
+    session::Session,
 };
 
 const AFTER: &str = "\

@@ -4,13 +4,16 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use toile_character::BodyModel;
+use toile_pipeline::{
+    Folders, Goal, Observer, Options, Run,
+    steps::fit::{self, BodyEdits},
+};
 
 use crate::{
     StudioError,
-    commands::{must_exist, reach},
+    commands::reach::{must_exist, reach},
     outcome::Answer,
-    pipeline::{Goal, Options, Run, fit, fit::BodyEdits, folders::Folders},
-    run::Session,
+    session::Session,
 };
 
 const AFTER: &str = "\
@@ -88,7 +91,7 @@ impl Fit {
 fn fit_scan(scan: &Path, out: &Path, edits: BodyEdits, session: &Session) -> Result<Answer, StudioError> {
     must_exist(scan)?;
     let name = scan.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let run = Run::single(scan.parent().unwrap_or(Path::new(".")), &name, &session.progress);
+    let run = Run::single(scan.parent().unwrap_or(Path::new(".")), &name, session.progress.as_ref());
     session.progress.plan(fit::COST);
     let place = fit::Place {
         scan: scan.to_path_buf(),

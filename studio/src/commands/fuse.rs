@@ -6,13 +6,13 @@ use clap::ValueEnum;
 use serde_json::json;
 use toile_capture::{CaptureError, trajectory};
 use toile_fusion::{FusionSettings, KnownPose, Prior, Volume};
+use toile_pipeline::{Goal, Observer, Options, Run, steps::fuse};
 
 use crate::{
     StudioError,
-    commands::{is_subject, must_exist, reach},
+    commands::reach::{is_subject, must_exist, reach},
     outcome::Answer,
-    pipeline::{Goal, Options, Run, fuse},
-    run::Session,
+    session::Session,
 };
 
 const AFTER: &str = "\
@@ -112,7 +112,7 @@ impl Fuse {
         let name = self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{name}-scan")));
         let root = self.path.parent().unwrap_or(Path::new("."));
-        let run = Run::single(root, &name, &session.progress);
+        let run = Run::single(root, &name, session.progress.as_ref());
         session.progress.plan(fuse::COST);
         let record = fuse::fuse_recording(&run, &self.path, &out, &name, settings)?;
         let files = ["scan.ply", "trajectory.tum", "report.json", "timings.json"].map(|f| out.join(f));

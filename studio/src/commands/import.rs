@@ -9,8 +9,9 @@ use toile_capture::{
     import::{self, Format, ImportReport},
     printable_path,
 };
+use toile_pipeline::{Observer, Opened};
 
-use crate::{StudioError, commands::must_exist, outcome::Answer, pipeline::opened::Opened, run::Session};
+use crate::{StudioError, commands::reach::must_exist, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.

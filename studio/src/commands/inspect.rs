@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde_json::json;
 use toile_capture::inspect;
 
-use crate::{StudioError, commands::must_exist, outcome::Answer, run::Session};
+use crate::{StudioError, commands::reach::must_exist, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 Exits with 3 where recorded data was lost (a torn file, frames that cannot be read).

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use serde_json::json;
 use toile_fitting::MeasureTable;
+use toile_pipeline::body_file::read_json;
 
-use crate::{StudioError, commands::fit::Person, outcome::Answer, pipeline::body_file::read_json, run::Session};
+use crate::{StudioError, commands::fit::Person, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 Girths as a taut tape lies, heights above the soles, standing straight. Fits the body first where that is missing.

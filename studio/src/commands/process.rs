@@ -8,13 +8,9 @@ use std::{
 };
 
 use serde_json::{Value, json};
+use toile_pipeline::{Goal, Options, Summary, process as process_subject};
 
-use crate::{
-    StudioError,
-    outcome::Answer,
-    pipeline::{self, Goal, Options, Summary},
-    run::Session,
-};
+use crate::{StudioError, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 What is up to date is not done again; a run that was interrupted goes on where it was.
@@ -57,7 +53,9 @@ pub fn process(subjects: &[PathBuf], options: &Options, session: &Session) -> Re
     let (mut rows, mut results) = (Vec::new(), Vec::new());
     for subject in subjects {
         let started = Instant::now();
-        let done = guarded(subject, || pipeline::process(subject, Goal::Report, options, &session.progress));
+        let done = guarded(subject, || {
+            process_subject(subject, Goal::Report, options, session.progress.as_ref()).map_err(StudioError::from)
+        });
         let seconds = started.elapsed().as_secs_f64();
         let name = subject.display().to_string();
         match done {

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use serde_json::json;
+use toile_pipeline::Observer;
 use toile_synthetic::{
     GarmentKind, GarmentSettings, SensorPreset, Sex, Subject, SyntheticError, SyntheticSettings,
     folder::write_subject_folder, record::record_subject,
 };
 
-use crate::{StudioError, outcome::Answer, run::Session};
+use crate::{StudioError, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 A virtual person on a turning disk, seen by a virtual depth camera; everything follows from the seed.

@@ -1,0 +1,25 @@
+//! Recording a take while it is watched: the camera's thread, the recorder, and the live preview, each at its own pace.
+//!
+//! - [`Device`]: what was asked for, opened as a source of frames; [`RigFile`]: several of them in one file;
+//! - [`record()`]: frames go to the file in the order in which they come; none is dropped here;
+//! - [`Seen`]: what the preview, a thread that fuses what it can keep up with, knows of the turn;
+//! - [`Status`]: how the take stands, several times a second, for whoever shows it.
+
+mod device;
+mod error;
+mod preview;
+mod record;
+mod rig_file;
+mod status;
+mod stop;
+mod together;
+mod turn;
+
+pub use device::Device;
+pub use error::LiveError;
+pub use preview::Seen;
+pub use record::{Recorded, record};
+pub use rig_file::RigFile;
+pub use status::Status;
+pub use stop::{Pace, Stop};
+pub use turn::Turn;

@@ -1,0 +1,138 @@
+//! `--rig`: a file that names several sensors and where each stands.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use toile_capture::{CaptureError, Layer, Source, Subject};
+use toile_geometry::Rigid;
+
+use crate::{LiveError, device::Device, stop::Pace, together::Together};
+
+/// Sensors that record together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigFile {
+    path: PathBuf,
+    sensors: Vec<Placed>,
+}
+
+/// One sensor of the file.
+#[derive(Debug, Clone, PartialEq)]
+struct Placed {
+    device: Device,
+    name: Option<String>,
+    rig_from_depth: Rigid,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Text {
+    sensor: Vec<SensorText>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SensorText {
+    /// As `--device` has it.
+    device: String,
+    /// Short name, unique in the rig; the device's own where there is none.
+    name: Option<String>,
+    /// Where its depth camera stands in the rig's frame, metres.
+    #[serde(default)]
+    position: [f64; 3],
+    /// How it is turned there: axis times angle, degrees.
+    #[serde(default)]
+    rotation: [f64; 3],
+}
+
+impl RigFile {
+    /// Reads the file (TOML): a `[[sensor]]` for each with `device` and, where true, `name`, `position`, `rotation`.
+    ///
+    /// # Errors
+    /// [`LiveError`] names the file and what is wrong with it.
+    pub fn read(path: &Path) -> Result<Self, LiveError> {
+        let text = std::fs::read_to_string(path).map_err(|e| CaptureError::io(path, e))?;
+        let sensors = parse(&text).map_err(|e| LiveError::Settings(format!("{}: {e}", path.display())))?;
+        Ok(Self { path: path.to_path_buf(), sensors })
+    }
+
+    /// Who sets the pace: the devices, where one of them does.
+    pub fn pace(&self) -> Pace {
+        let is_live = self.sensors.iter().any(|s| s.device.pace() == Pace::Live);
+        if is_live { Pace::Live } else { Pace::OnDemand }
+    }
+
+    /// What its recordings lost before they came here, a sentence each.
+    ///
+    /// # Errors
+    /// [`LiveError`] where one cannot be read at all.
+    pub fn damage(&self) -> Result<Vec<String>, LiveError> {
+        let told = self.sensors.iter().map(|placed| placed.device.damage());
+        told.filter_map(Result::transpose).collect()
+    }
+
+    /// Opens all sensors for a take of `subject` that will be `layer`.
+    ///
+    /// # Errors
+    /// [`LiveError`] says which cannot be opened and why.
+    pub fn open(&self, subject: &Subject, layer: &Layer) -> Result<Box<dyn Source>, LiveError> {
+        let mut sources = Vec::new();
+        for placed in &self.sensors {
+            let source = placed.device.open(subject, layer)?;
+            sources.push((source, placed.name.clone(), placed.rig_from_depth));
+        }
+        let together = Together::new(sources, self.pace());
+        Ok(Box::new(together.map_err(|reason| LiveError::Settings(format!("{}: {reason}", self.path.display())))?))
+    }
+}
+
+fn parse(text: &str) -> Result<Vec<Placed>, String> {
+    let file: Text = toml::from_str(text).map_err(|e| e.message().to_string())?;
+    if file.sensor.is_empty() {
+        return Err("it names no [[sensor]]".into());
+    }
+    let placed = |sensor: SensorText| {
+        if !sensor.position.iter().chain(&sensor.rotation).all(|v| v.is_finite()) {
+            return Err(format!("{}: position and rotation must be finite numbers", sensor.device));
+        }
+        let rotation = sensor.rotation.map(f64::to_radians);
+        let rig_from_depth = Rigid::new(sensor.position.into(), rotation.into());
+        Ok(Placed { device: sensor.device.parse()?, name: sensor.name, rig_from_depth })
+    };
+    let sensors: Vec<Placed> = file.sensor.into_iter().map(placed).collect::<Result<_, _>>()?;
+    if sensors.iter().any(|s| s.device.pace() != sensors[0].device.pace()) {
+        return Err("cameras do not wait for recordings or the virtual sensor; put them into rigs of their own".into());
+    }
+    Ok(sensors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sensors_stand_where_the_file_says() {
+        let text = "[[sensor]]\ndevice = \"kinect1:A\"\n[[sensor]]\ndevice = \"realsense\"\nname = \"back\"\n\
+                    position = [0.0, 0.0, 4.0]\nrotation = [0.0, 180.0, 0.0]\n";
+        let sensors = parse(text).unwrap();
+        assert_eq!(
+            (sensors[0].device.clone(), sensors[0].rig_from_depth),
+            (Device::Kinect1(Some("A".into())), Rigid::identity())
+        );
+        let seen = sensors[1].rig_from_depth * nalgebra::Point3::new(0.5, 0.0, 1.0);
+        assert!((seen - nalgebra::Point3::new(-0.5, 0.0, 3.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        for (text, words) in [
+            ("", "sensor"),
+            ("sensor = []", "no [[sensor]]"),
+            ("[[sensor]]\ndevice = \"kinect9\"", "choose of"),
+            ("[[sensor]]\ndevice = \"kinect1\"\nplace = 1", "place"),
+            ("[[sensor]]\ndevice = \"kinect1\"\n[[sensor]]\ndevice = \"synthetic\"", "rigs of their own"),
+            ("[[sensor]]\ndevice = \"kinect1\"\nposition = [nan, 0.0, 0.0]", "finite"),
+        ] {
+            assert!(parse(text).unwrap_err().contains(words), "{text}");
+        }
+    }
+}
