@@ -5,7 +5,7 @@
 //! - [`Mesh`]: an indexed triangle mesh with optional normals, colours and named vertex attributes;
 //! - [`camera::PinholeCamera`]: pinhole projection with optional Brown–Conrady distortion;
 //! - [`bvh::Bvh`]: closest point, ray and overlap queries over a mesh's triangles;
-//! - [`raster::rasterize`]: what a camera sees of a mesh;
+//! - [`raster::rasterize`]: the triangles that a camera sees;
 //! - [`topology`]: edges, neighbours, boundary loops, components; [`areas`], [`laplacian`], [`edge_distance`],
 //!   [`surface_solve`]: measures and equations on a surface;
 //! - [`statistics`]: medians, quantiles, robust spreads; [`lanes`]: vector instructions chosen at run time;
@@ -35,7 +35,8 @@ pub mod decimate;
 pub mod direction;
 pub mod edge_distance;
 pub mod element;
-pub mod error;
+mod error;
+pub mod file;
 pub mod handles;
 pub mod holes;
 pub mod intersection;
@@ -45,6 +46,7 @@ pub mod max_flow;
 pub mod mesh;
 pub mod obj;
 pub mod ply;
+pub mod point_tree;
 pub mod polygon;
 pub mod predicates;
 pub mod raster;

@@ -1,0 +1,71 @@
+//! The one traversal that all queries share: depth first, the more promising child first.
+
+use std::ops::Range;
+
+use super::tree::{Node, Tree};
+
+/// A query over a tree: which boxes it looks into, in which order, and what it does with the items.
+pub(crate) trait Query {
+    /// How promising a box is: of two children the one with the lower rank is visited first, the left one of equals.
+    fn rank(&self, node: &Node) -> f32;
+
+    /// False where no item in a box of this rank can matter any more. Asked right before the box would be visited.
+    fn wants(&self, rank: f32) -> bool;
+
+    /// True where the query takes the box `index` as a whole instead of looking into it.
+    #[inline]
+    fn takes_whole(&mut self, _index: usize) -> bool {
+        false
+    }
+
+    /// Looks at the items of a leaf, given by their places in the order.
+    fn visit(&mut self, places: Range<usize>);
+}
+
+impl Tree {
+    /// Visits the leaves that `query` wants.
+    #[inline]
+    pub(crate) fn traverse<Q: Query>(&self, query: &mut Q) {
+        let mut stack = Stack::new();
+        if let Some(root) = self.nodes.first() {
+            stack.push((query.rank(root), 0));
+        }
+        while let Some((rank, n)) = stack.pop() {
+            if !query.wants(rank) || query.takes_whole(n as usize) {
+                continue;
+            }
+            let node = &self.nodes[n as usize];
+            if node.count > 0 {
+                query.visit(node.items());
+                continue;
+            }
+            let [l, r] = node.children(n).map(|c| (query.rank(&self.nodes[c as usize]), c));
+            let (near, far) = if l.0 <= r.0 { (l, r) } else { (r, l) };
+            stack.push(far);
+            stack.push(near);
+        }
+    }
+}
+
+/// A small stack without allocation.
+struct Stack {
+    items: [(f32, u32); 64],
+    len: usize,
+}
+
+impl Stack {
+    fn new() -> Self {
+        Self { items: [(0.0, 0); 64], len: 0 }
+    }
+    // Median splits balance the tree, so that 64 entries are enough for more items than a u32 counts.
+    #[inline]
+    fn push(&mut self, item: (f32, u32)) {
+        self.items[self.len] = item;
+        self.len += 1;
+    }
+    #[inline]
+    fn pop(&mut self) -> Option<(f32, u32)> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.items[self.len])
+    }
+}
