@@ -1,4 +1,4 @@
-//! What can go wrong with motion.
+//! Errors of motion.
 
 use std::path::PathBuf;
 
@@ -10,42 +10,45 @@ pub enum AnimationError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
+    /// A motion file is not one that can be read, such as a folder or a pipe.
+    #[error(transparent)]
+    File(toile_geometry::GeometryError),
     /// A BVH file is not what its format says.
     #[error("{name}, line {line}: {reason}")]
     Bvh {
-        /// The file, or what stands for it.
+        /// The file, or a name that stands for it.
         name: String,
         /// Line, counted from 1.
         line: usize,
-        /// What is wrong there.
+        /// The reason.
         reason: String,
     },
     /// The joints of a motion could not be recognised.
     #[error(
-        "unknown skeleton: no {missing} among the joints {found}; a motion needs upper and lower legs, feet, \
-         upper and lower arms of both sides and a spine between them; rename the joints in the BVH file, \
-         for example to the names of VRM bones"
+        "the skeleton is not recognised: there is no {missing} among the joints {found}; a motion needs upper and \
+         lower legs, feet, upper and lower arms on both sides and a spine between them; rename the joints in the \
+         BVH file, for example to the names of VRM bones"
     )]
     UnknownSkeleton {
-        /// What is needed and not there.
+        /// The part of the body that is missing.
         missing: String,
-        /// The joints that are there.
+        /// The joints of the file.
         found: String,
     },
-    /// A motion or a skeleton that nothing can be made of.
+    /// A motion or a skeleton that cannot be used.
     #[error("motion: {0}")]
     Motion(String),
     /// A setting out of its range.
     #[error("setting {name} is {value}; it must be {range}")]
     Setting {
-        /// Which setting.
+        /// Name of the setting.
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Its range.
         range: &'static str,
     },
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-/// What a buffer view is bound to.
+/// Use of a buffer view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Target {
     /// Vertex attributes.
@@ -86,7 +86,7 @@ impl Buffer {
         self.accessors.len() - 1
     }
 
-    /// Adds floats with their `min` and `max`, which glTF wants of positions and key times.
+    /// Adds floats with their `min` and `max`, which glTF requires for positions and key times.
     pub fn add_bounded(&mut self, values: &[f32], shape: Shape, target: Target) -> usize {
         let accessor = self.add(values, shape, target);
         let width = shape as usize;

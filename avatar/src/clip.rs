@@ -1,4 +1,4 @@
-//! A motion as a glTF animation: rotation tracks of the joints that move, and the way of the hips.
+//! A motion as a glTF animation: rotation tracks of the joints that move, and the path of the hips.
 
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use toile_character::{Joint, Motion, Pose, Skeleton, joint::JOINTS};
 
 use crate::buffer::{Buffer, Shape, Target};
 
-/// Turns and shifts below these are no movement: radians, metres.
+/// Smaller turns and shifts do not count as movement: radians, metres.
 const STILL_ANGLE: f64 = 1e-5;
 const STILL_SHIFT: f64 = 1e-6;
 

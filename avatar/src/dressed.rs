@@ -10,17 +10,17 @@ use crate::AvatarError;
 /// A person's body and garments, each a skinned layer of its own, on one skeleton.
 #[derive(Debug, Clone)]
 pub struct Avatar {
-    /// What the avatar is called.
+    /// Name of the avatar.
     pub name: String,
     /// Joints of the person in the A-pose rest.
     pub skeleton: Skeleton,
-    /// How the joints are called in a GLB file.
+    /// Names of the joints in a GLB file.
     pub joint_names: JointNaming,
     /// The pose that the layers are in, relative to that rest: for an avatar from scans, the pose of scan 0.
     pub pose0: Pose,
     /// The layers, inside to outside.
     pub layers: Vec<AvatarLayer>,
-    /// Motions to go along as clips, poses relative to the rest.
+    /// Motions, exported as clips, poses relative to the rest.
     pub motions: Vec<Motion>,
 }
 
@@ -42,10 +42,10 @@ pub struct AvatarLayer {
 }
 
 impl Avatar {
-    /// The same avatar in `pose`: all layers moved there by their skin weights, normals left to be recomputed.
+    /// The same avatar in `pose`: all layers moved there by their skin weights, normals dropped so that the writer recomputes them.
     ///
     /// # Errors
-    /// What [`Avatar::validate`] finds.
+    /// As [`Avatar::validate`].
     pub fn in_pose(&self, pose: &Pose) -> Result<Self, AvatarError> {
         self.validate()?;
         check_pose(pose).map_err(AvatarError::Skeleton)?;
@@ -69,10 +69,10 @@ impl Avatar {
             return Err(AvatarError::Avatar("it has no name".into()));
         }
         if self.layers.is_empty() {
-            return Err(AvatarError::Avatar("it has no layer; at least the body is needed".into()));
+            return Err(AvatarError::Avatar("it has no layer; add at least the body".into()));
         }
         if self.skeleton.rest.iter().any(|p| !p.coords.iter().all(|c| c.is_finite())) {
-            return Err(AvatarError::Skeleton("a joint is nowhere (its position is not finite)".into()));
+            return Err(AvatarError::Skeleton("the position of a joint is not finite".into()));
         }
         check_pose(&self.pose0).map_err(AvatarError::Skeleton)?;
         let mut names = BTreeSet::new();
@@ -112,12 +112,12 @@ impl AvatarLayer {
         }
         for (v, (joints, weights)) in self.weights.joints.iter().zip(&self.weights.weights).enumerate() {
             if joints.iter().zip(weights).any(|(j, w)| *w > 0.0 && *j as usize >= JOINT_COUNT) {
-                return wrong(format!("vertex {v} hangs on a joint beyond the {JOINT_COUNT} there are"));
+                return wrong(format!("vertex {v} hangs on a joint beyond the last of {JOINT_COUNT}"));
             }
             let sum: f32 = weights.iter().sum();
             if !weights.iter().all(|w| w.is_finite() && *w >= 0.0) || sum <= 0.0 {
                 return wrong(format!(
-                    "the skin weights of vertex {v} are {weights:?}; none may be negative, one above 0"
+                    "the skin weights of vertex {v} are {weights:?}; none may be negative and at least one must be above 0"
                 ));
             }
         }
@@ -149,7 +149,7 @@ fn check_motion(motion: &Motion) -> Result<(), AvatarError> {
 
 fn check_pose(pose: &Pose) -> Result<(), String> {
     if pose.rotations.len() != JOINT_COUNT {
-        return Err(format!("a pose has {} rotations where there are {JOINT_COUNT} joints", pose.rotations.len()));
+        return Err(format!("a pose has {} rotations but there are {JOINT_COUNT} joints", pose.rotations.len()));
     }
     let unit = |q: &nalgebra::UnitQuaternion<f64>| (q.norm() - 1.0).abs() < 1e-6;
     if !pose.translation.iter().all(|c| c.is_finite()) || !pose.rotations.iter().all(unit) {

@@ -1,28 +1,28 @@
-//! What can go wrong with an avatar.
+//! Errors of avatars.
 
 /// Errors of the avatar crate.
 #[derive(Debug, thiserror::Error)]
 pub enum AvatarError {
-    /// A layer that no file can be made of.
+    /// A layer that cannot be written.
     #[error("layer `{layer}`: {reason}")]
     Layer {
         /// The layer's name.
         layer: String,
-        /// What is wrong with it.
+        /// The reason.
         reason: String,
     },
     /// Skeleton or pose are not usable.
     #[error("skeleton: {0}")]
     Skeleton(String),
-    /// A motion that no clip can be made of.
+    /// A motion that cannot be written.
     #[error("motion `{motion}`: {reason}")]
     Motion {
         /// The motion's name.
         motion: String,
-        /// What is wrong with it.
+        /// The reason.
         reason: String,
     },
-    /// The avatar as a whole, or what is said about it.
+    /// The avatar as a whole, or its meta data.
     #[error("avatar: {0}")]
     Avatar(String),
 }

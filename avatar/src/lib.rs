@@ -34,14 +34,14 @@
 
 mod buffer;
 mod clip;
-pub mod dressed;
-pub mod error;
-pub mod glb;
+mod dressed;
+mod error;
+mod glb;
 mod layer_mesh;
 mod rig;
-pub mod vrm;
+mod vrm;
 
 pub use dressed::{Avatar, AvatarLayer};
 pub use error::AvatarError;
 pub use glb::write_glb;
-pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, write_vrm};
+pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, vrm_pose, write_vrm};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
-use toile_character::{Joint, JointNaming, dress_pose::t_pose, joint::JOINTS};
+use toile_character::{Joint, JointNaming, Pose, Skeleton, dress_pose::t_pose, joint::JOINTS};
 
 use crate::{
     Avatar, AvatarError,
@@ -14,19 +14,19 @@ use crate::{
 /// The licence text that VRM 1.0 files refer to.
 const LICENCE_URL: &str = "https://vrm.dev/licenses/1.0/";
 
-/// Who may wear an avatar.
+/// Who may use an avatar as their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum AvatarPermission {
-    /// The author alone.
+    /// Only the author.
     OnlyAuthor,
-    /// People whom the author licensed.
+    /// People who have a licence from the author.
     OnlySeparatelyLicensedPerson,
     /// Anyone.
     Everyone,
 }
 
-/// For what an avatar may be used.
+/// Permitted uses of an avatar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum CommercialUsage {
@@ -38,7 +38,7 @@ pub enum CommercialUsage {
     Corporation,
 }
 
-/// What VRM says about an avatar. The default allows the author alone to use it: it shows a real person.
+/// Terms of use in a VRM file. By default only the author may use the avatar: it shows a real person.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct VrmMeta {
@@ -48,15 +48,15 @@ pub struct VrmMeta {
     pub version: String,
     /// Authors; at least one.
     pub authors: Vec<String>,
-    /// Who may wear it.
+    /// Who may use it as their own avatar.
     pub avatar_permission: AvatarPermission,
-    /// For what it may be used.
+    /// Permitted uses.
     pub commercial_usage: CommercialUsage,
-    /// May it be passed on?
+    /// Whether it may be redistributed.
     pub allow_redistribution: bool,
-    /// May it be changed, and the changed one passed on?
+    /// Whether it may be changed; with `allow_redistribution`, whether the changed one may be redistributed.
     pub allow_modification: bool,
-    /// Must the authors be named?
+    /// Whether the authors must be named.
     pub credit_required: bool,
 }
 
@@ -75,19 +75,25 @@ impl Default for VrmMeta {
     }
 }
 
+/// The pose that [`write_vrm`] bakes the layers into: a T-pose. Check here what a VRM file will show, such as layers
+/// that cross.
+pub fn vrm_pose(skeleton: &Skeleton) -> Pose {
+    t_pose(skeleton)
+}
+
 /// The avatar as a VRM 1.0 file.
 ///
 /// All layers are moved to the T-pose by their skin weights (A → T baking) with feet at the height they rest at;
-/// bones rest without rotation, facing +Z; all 52 joints are named, the 15 that VRM requires among them. Motions
+/// bones rest without rotation, facing +Z; all 52 joints are named, among them the 15 that VRM requires. Motions
 /// are left out: VRM keeps them in files of their own.
 ///
 /// # Errors
-/// What [`Avatar::validate`] finds; [`AvatarError::Avatar`] where no author is named.
+/// As [`Avatar::validate`]; [`AvatarError::Avatar`] where no author is named.
 pub fn write_vrm(avatar: &Avatar, meta: &VrmMeta) -> Result<Vec<u8>, AvatarError> {
     if meta.authors.is_empty() || meta.authors.iter().any(|a| a.trim().is_empty()) {
         return Err(AvatarError::Avatar("a VRM file names at least one author".into()));
     }
-    let baked = Avatar { joint_names: JointNaming::Vrm, ..avatar.in_pose(&t_pose(&avatar.skeleton))? };
+    let baked = Avatar { joint_names: JointNaming::Vrm, ..avatar.in_pose(&vrm_pose(&avatar.skeleton))? };
     let rig = Rig::unturned(&baked.skeleton, &baked.pose0);
     let mut buffer = Buffer::default();
     let mut document = document(&baked, &rig, &mut buffer);

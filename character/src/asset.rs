@@ -46,11 +46,28 @@ struct Section {
     bytes: usize,
 }
 
-/// Reads a body asset.
-///
-/// # Errors
-/// [`CharacterError::Asset`] says what is torn, foreign or out of range.
-pub fn read(bytes: &[u8]) -> Result<BodyModel, CharacterError> {
+/// The asset that ships with the program, made by `character/generator`.
+const DEFAULT_ASSET: &[u8] = include_bytes!("../assets/body.toile");
+
+impl BodyModel {
+    /// The model that ships with the program.
+    ///
+    /// # Errors
+    /// [`CharacterError::Asset`] where the program was built with a broken asset.
+    pub fn load_default() -> Result<Self, CharacterError> {
+        Self::from_bytes(DEFAULT_ASSET)
+    }
+
+    /// Reads a body asset.
+    ///
+    /// # Errors
+    /// [`CharacterError::Asset`] says what is torn, of another kind or out of range.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, CharacterError> {
+        read(bytes)
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<BodyModel, CharacterError> {
     let (header, mut body) = open(bytes)?;
     let mut sections = Vec::with_capacity(header.sections.len());
     for s in &header.sections {
@@ -75,7 +92,7 @@ fn open(bytes: &[u8]) -> Result<(Header, &[u8]), CharacterError> {
         return Err(wrong(format!("version {version} is not known (this program reads version {VERSION})")));
     }
     let (text, body) = data[16..].split_at_checked(u32_at(data, 12) as usize).ok_or_else(|| wrong(torn(bytes)))?;
-    if crc32(data) != u32::from_le_bytes(*sum) {
+    if crc32fast::hash(data) != u32::from_le_bytes(*sum) {
         return Err(wrong(torn(bytes)));
     }
     let header = serde_json::from_slice(text).map_err(|e| wrong(format!("header: {e}")))?;
@@ -136,7 +153,7 @@ impl Reader<'_> {
             return Err(wrong(format!("{} vertices, {} components: out of range", h.vertices, h.components)));
         }
         if let Some(l) = h.landmarks.iter().find(|l| l.vertex as usize >= h.vertices) {
-            return Err(wrong(format!("landmark {} names vertex {} of {}", l.name, l.vertex, h.vertices)));
+            return Err(wrong(format!("landmark {} names vertex {}, but there are {}", l.name, l.vertex, h.vertices)));
         }
         if [&h.sigma_mm, &h.beta_male, &h.beta_female].iter().any(|v| v.len() != h.components) {
             return Err(wrong(format!("sigma or mean betas are not of length {}", h.components)));
@@ -230,49 +247,9 @@ impl Reader<'_> {
     }
 }
 
-/// CRC-32 (IEEE 802.3), eight bytes at a time.
-fn crc32(data: &[u8]) -> u32 {
-    let tables = crc_tables();
-    let mut crc = !0u32;
-    let chunks = data.chunks_exact(8);
-    let rest = chunks.remainder();
-    for c in chunks {
-        let low = crc ^ u32_at(c, 0);
-        let high = u32_at(c, 4);
-        let byte = |word: u32, k: u32| (word >> (8 * k) & 0xff) as usize;
-        crc =
-            (0..4).fold(0, |sum, k| sum ^ tables[7 - k as usize][byte(low, k)] ^ tables[3 - k as usize][byte(high, k)]);
-    }
-    for &b in rest {
-        crc = crc >> 8 ^ tables[0][((crc ^ u32::from(b)) & 0xff) as usize];
-    }
-    !crc
-}
-
-fn crc_tables() -> [[u32; 256]; 8] {
-    let mut tables = [[0u32; 256]; 8];
-    for i in 0..256u32 {
-        tables[0][i as usize] = (0..8).fold(i, |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 });
-    }
-    for i in 0..256 {
-        for t in 1..8 {
-            let before = tables[t - 1][i];
-            tables[t][i] = before >> 8 ^ tables[0][(before & 0xff) as usize];
-        }
-    }
-    tables
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body_model::DEFAULT_ASSET;
-
-    #[test]
-    fn crc_matches_the_published_check_value() {
-        assert_eq!(crc32(b"123456789"), 0xcbf4_3926);
-        assert_eq!(crc32(b"The quick brown fox jumps over the lazy dog"), 0x414f_a339);
-    }
 
     #[test]
     fn a_torn_or_changed_file_is_named_so() {
@@ -292,7 +269,7 @@ mod tests {
     fn a_newer_version_and_wrong_contents_are_named() {
         let sealed = |mut data: Vec<u8>| {
             let end = data.len() - 4;
-            let sum = crc32(&data[..end]).to_le_bytes();
+            let sum = crc32fast::hash(&data[..end]).to_le_bytes();
             data[end..].copy_from_slice(&sum);
             read(&data).unwrap_err().to_string()
         };

@@ -8,73 +8,10 @@ use serde::{Deserialize, Serialize};
 use toile_geometry::Mesh;
 
 use crate::{
-    CharacterError, Pose, Skeleton, SkinWeights, SkinnedMesh, asset, dress_pose,
+    CharacterError, Pose, Region, Skeleton, SkinWeights, SkinnedMesh, dress_pose,
     joint::{JOINT_COUNT, JOINTS},
     mean_value::mean_value_weights,
 };
-
-/// The asset that ships with the program, made by `character/generator`.
-pub const DEFAULT_ASSET: &[u8] = include_bytes!("../assets/body.toile");
-
-/// The part of the body that a template vertex belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[repr(u8)]
-#[allow(missing_docs)] // the names are the documentation
-pub enum Region {
-    Torso,
-    LeftArm,
-    RightArm,
-    LeftLeg,
-    RightLeg,
-    LeftHand,
-    RightHand,
-    LeftFoot,
-    RightFoot,
-    Head,
-}
-
-impl Region {
-    /// All regions; the position is the asset's code.
-    pub const ALL: [Self; 10] = [
-        Self::Torso,
-        Self::LeftArm,
-        Self::RightArm,
-        Self::LeftLeg,
-        Self::RightLeg,
-        Self::LeftHand,
-        Self::RightHand,
-        Self::LeftFoot,
-        Self::RightFoot,
-        Self::Head,
-    ];
-
-    /// The region with this code.
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.get(usize::from(code)).copied()
-    }
-
-    /// In words, such as `left hand`.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Torso => "torso",
-            Self::LeftArm => "left arm",
-            Self::RightArm => "right arm",
-            Self::LeftLeg => "left leg",
-            Self::RightLeg => "right leg",
-            Self::LeftHand => "left hand",
-            Self::RightHand => "right hand",
-            Self::LeftFoot => "left foot",
-            Self::RightFoot => "right foot",
-            Self::Head => "head",
-        }
-    }
-
-    /// True for hands, feet and head: thin or detailed, and left out where bodies are scored.
-    pub fn is_extremity(self) -> bool {
-        use Region::*;
-        matches!(self, LeftHand | RightHand | LeftFoot | RightFoot | Head)
-    }
-}
 
 /// How the joints of a body are found from its shape.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -87,7 +24,7 @@ pub enum JointRegressor {
     MeanValue,
 }
 
-/// What is known of the people that the model was made from.
+/// Facts about the people that the model was made from.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PopulationInfo {
     /// Mean β of the men.
@@ -131,25 +68,9 @@ pub struct BodyModel {
 }
 
 impl BodyModel {
-    /// The model that ships with the program.
-    ///
-    /// # Errors
-    /// [`CharacterError::Asset`] where the program was built with a broken asset.
-    pub fn load_default() -> Result<Self, CharacterError> {
-        Self::from_bytes(DEFAULT_ASSET)
-    }
-
-    /// Reads a body asset.
-    ///
-    /// # Errors
-    /// [`CharacterError::Asset`] says what is torn, foreign or out of range.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, CharacterError> {
-        asset::read(bytes)
-    }
-
     /// Vertices of the body with coefficients `beta` in its rest pose (Hu et al. 2017, eq. 2), metres.
     ///
-    /// `beta` may be shorter than the number of components (k = 15 as in the seed); what is longer is left out.
+    /// `beta` may be shorter than the number of components (k = 15 as in the seed); further coefficients are ignored.
     pub fn shape(&self, beta: &[f64]) -> Vec<Point3<f32>> {
         const CHUNK: usize = 1024;
         let mut out = self.mean.clone();
@@ -178,7 +99,7 @@ impl BodyModel {
     /// Rest joints of a body with this template's topology by mean value coordinates (Hu et al. 2017, eq. 1).
     ///
     /// # Errors
-    /// [`CharacterError::Mismatch`] where `vertices` are not as many as the template's.
+    /// [`CharacterError::Mismatch`] where the number of `vertices` is not the template's.
     pub fn joints_mvc(&self, vertices: &[Point3<f32>]) -> Result<Skeleton, CharacterError> {
         if vertices.len() != self.mean.len() {
             let (have, want) = (vertices.len(), self.mean.len());
@@ -210,7 +131,7 @@ impl BodyModel {
         self.skeleton_by(beta, JointRegressor::Affine)
     }
 
-    /// Rest joints of the body with coefficients `beta` by the given way.
+    /// Rest joints of the body with coefficients `beta` by `regressor`.
     pub fn skeleton_by(&self, beta: &[f64], regressor: JointRegressor) -> Skeleton {
         match regressor {
             JointRegressor::Affine => self.joints_affine(beta),

@@ -24,7 +24,7 @@ pub fn a_pose(skeleton: &Skeleton) -> Pose {
 
 /// Straight arms `arm_down` below the horizontal, straight legs `leg_out` from the vertical (radians).
 ///
-/// Each bone takes the least turn that gives it its direction; hands turn with the forearm until the middle finger's
+/// Each bone takes the smallest turn that gives it its direction; hands turn with the forearm until the middle finger's
 /// root lies on the arm's line; feet keep the world orientation they rest in. The rest must stand upright, facing +Z.
 pub fn straight_limbs(skeleton: &Skeleton, arm_down: f64, leg_out: f64) -> Pose {
     let mut world = [UnitQuaternion::identity(); JOINT_COUNT];
@@ -75,8 +75,8 @@ fn goal(joint: Joint, arm_down: f64, leg_out: f64) -> Goal {
     }
 }
 
-/// Least rotation from one direction to another; half a turn where they are opposite; none where one is zero. Safe
-/// where they are (nearly) the same: the cosine of rounded unit vectors may exceed 1.
+/// Smallest rotation from one direction to another: half a turn where they are opposite, the identity where one is zero.
+/// Safe where they are (nearly) the same: the cosine of rounded unit vectors may exceed 1.
 fn least_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
     let (Some(a), Some(b)) = (from.try_normalize(1e-9), to.try_normalize(1e-9)) else {
         return UnitQuaternion::identity();

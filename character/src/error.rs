@@ -1,4 +1,4 @@
-//! What can go wrong with a character.
+//! Errors of characters.
 
 /// Errors of the character crate.
 #[derive(Debug, thiserror::Error)]

@@ -77,12 +77,12 @@ fn bend_toes(target: &Skeleton, pose: &mut Pose, foot: Joint, toes: Joint) {
     let (at, turn) = (frames[toes.index()].translation.vector, frames[toes.index()].rotation);
     let front = turn * rest_front;
     // toes lie level at rest, so their tip is then as high as their joint
-    let least = (target.position(toes).y - at.y) / length.max(1e-9);
-    if front.y >= least || least > 0.9 {
+    let lowest_slope = (target.position(toes).y - at.y) / length.max(1e-9);
+    if front.y >= lowest_slope || lowest_slope > 0.9 {
         return;
     }
     let level = unit_or(&Vector3::new(front.x, 0.0, front.z), &rest_front);
-    let raised = level * (1.0 - least * least).max(0.0).sqrt() + Vector3::y() * least;
+    let raised = level * (1.0 - lowest_slope * lowest_slope).max(0.0).sqrt() + Vector3::y() * lowest_slope;
     let turned: UnitQuaternion<f64> = swing(&front, &raised) * turn;
     *pose.rotation_mut(toes) = frames[foot.index()].rotation.inverse() * turned;
 }

@@ -2,73 +2,26 @@
 
 use serde::{Deserialize, Serialize};
 
-/// How many joints a skeleton has.
+/// Number of joints of a skeleton.
 pub const JOINT_COUNT: usize = 52;
 
-/// A joint of the humanoid skeleton; its discriminant is its index. Parents come before their children.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase")]
-#[repr(u8)]
-#[allow(missing_docs)] // the names are the documentation
-pub enum Joint {
-    Hips,
-    Spine,
-    Chest,
-    UpperChest,
-    Neck,
-    Head,
-    LeftShoulder,
-    LeftUpperArm,
-    LeftLowerArm,
-    LeftHand,
-    LeftUpperLeg,
-    LeftLowerLeg,
-    LeftFoot,
-    LeftToes,
-    RightShoulder,
-    RightUpperArm,
-    RightLowerArm,
-    RightHand,
-    RightUpperLeg,
-    RightLowerLeg,
-    RightFoot,
-    RightToes,
-    LeftThumbMetacarpal,
-    LeftThumbProximal,
-    LeftThumbDistal,
-    LeftIndexProximal,
-    LeftIndexIntermediate,
-    LeftIndexDistal,
-    LeftMiddleProximal,
-    LeftMiddleIntermediate,
-    LeftMiddleDistal,
-    LeftRingProximal,
-    LeftRingIntermediate,
-    LeftRingDistal,
-    LeftLittleProximal,
-    LeftLittleIntermediate,
-    LeftLittleDistal,
-    RightThumbMetacarpal,
-    RightThumbProximal,
-    RightThumbDistal,
-    RightIndexProximal,
-    RightIndexIntermediate,
-    RightIndexDistal,
-    RightMiddleProximal,
-    RightMiddleIntermediate,
-    RightMiddleDistal,
-    RightRingProximal,
-    RightRingIntermediate,
-    RightRingDistal,
-    RightLittleProximal,
-    RightLittleIntermediate,
-    RightLittleDistal,
+macro_rules! joints {
+    ($($name:ident),+ $(,)?) => {
+        /// A joint of the humanoid skeleton; its discriminant is its index. Parents come before their children.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+        #[serde(rename_all = "camelCase")]
+        #[repr(u8)]
+        #[allow(missing_docs)] // the names are the documentation
+        pub enum Joint {
+            $($name),+
+        }
+
+        /// All joints in index order.
+        pub const JOINTS: [Joint; JOINT_COUNT] = [$(Joint::$name),+];
+    };
 }
 
-use Joint::*;
-
-/// All joints in index order.
-pub const JOINTS: [Joint; JOINT_COUNT] = [
+joints!(
     Hips,
     Spine,
     Chest,
@@ -121,7 +74,9 @@ pub const JOINTS: [Joint; JOINT_COUNT] = [
     RightLittleProximal,
     RightLittleIntermediate,
     RightLittleDistal,
-];
+);
+
+use Joint::*;
 
 /// VRM names in index order.
 const NAMES: [&str; JOINT_COUNT] = [

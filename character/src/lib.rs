@@ -4,7 +4,7 @@
 //! - [`joint`]: the 52 VRM humanoid joints and their hierarchy;
 //! - [`Skeleton`]: where the joints of one person rest; [`Pose`]: how they are turned; [`joint_limits`]: how far they go;
 //! - [`SkinWeights`] and [`skinning`]: linear blend skinning (Hu et al. 2017, eq. 3) and its inverse;
-//! - [`BodyModel`]: the statistical body (eq. 1 joints by [`mean_value`], eq. 2 shape) from the committed asset ([`asset`]);
+//! - [`BodyModel`]: the statistical body (eq. 1 joints by [`mean_value`], eq. 2 shape) from the committed asset;
 //! - [`dress_pose`]: the A- and T-pose of any skeleton;
 //! - [`Motion`]: a pose over time; [`interpolation`]: poses between poses;
 //! - [`two_bone`], [`feet`]: inverse kinematics of arms and legs, feet kept out of the floor;
@@ -23,27 +23,29 @@
 //! # Ok::<(), toile_character::CharacterError>(())
 //! ```
 
-pub mod asset;
-pub mod body_model;
+mod asset;
+mod body_model;
 pub mod dress_pose;
-pub mod error;
+mod error;
 pub mod feet;
-pub mod garment_layer;
-pub mod garment_type;
+mod garment_layer;
+mod garment_type;
 pub mod interpolation;
 pub mod joint;
 pub mod limits;
 pub mod mean_value;
-pub mod motion;
-pub mod naming;
-pub mod pose;
-pub mod skeleton;
+mod motion;
+mod naming;
+mod pose;
+mod region;
+mod skeleton;
 pub mod skin;
+mod skinned_mesh;
 pub mod skinning;
 pub mod transfer;
 pub mod two_bone;
 
-pub use body_model::{BodyModel, JointRegressor, PopulationInfo, Region};
+pub use body_model::{BodyModel, JointRegressor, PopulationInfo};
 pub use error::CharacterError;
 pub use garment_layer::FREE_PART;
 pub use garment_type::GarmentType;
@@ -52,5 +54,7 @@ pub use limits::{JointLimit, joint_limits};
 pub use motion::Motion;
 pub use naming::JointNaming;
 pub use pose::Pose;
+pub use region::Region;
 pub use skeleton::Skeleton;
-pub use skin::{SkinWeights, SkinnedMesh};
+pub use skin::SkinWeights;
+pub use skinned_mesh::SkinnedMesh;

@@ -11,14 +11,14 @@ pub struct JointLimit {
     pub joint: Joint,
     /// Unit vector in the frame of the joint's parent, which at rest lies along the subject's.
     pub axis: Vector3<f64>,
-    /// Least angle, radians.
+    /// Smallest angle, radians.
     pub low: f64,
     /// Largest angle, radians.
     pub high: f64,
 }
 
 /// The limits of a body whose joints rest in the A-pose at `skeleton`: knees and elbows are hinges that do not bend
-/// backwards, feet tip a little, the neck does not turn the head round.
+/// backwards, feet tip a little, the neck does not turn the head backwards.
 pub fn joint_limits(skeleton: &Skeleton) -> Vec<JointLimit> {
     use Joint::*;
     let degrees = |joint, axis: Vector3<f64>, low: f64, high: f64| JointLimit {
@@ -54,7 +54,8 @@ impl JointLimit {
         (angle - self.high).max(0.0) + (angle - self.low).min(0.0)
     }
 
-    /// The same limit for rotations away from `pose`, axes again along the subject's: what holds where `pose` has become the rest.
+    /// The same limit for rotations away from `pose`, axes again along the subject's: the limit where `pose`
+    /// has become the rest.
     pub fn from_rest(&self, pose: &Pose) -> Self {
         let mut parent = UnitQuaternion::identity();
         let mut at = self.joint.parent();
@@ -110,9 +111,9 @@ mod tests {
         let elbow = Joint::LeftLowerArm;
         let limit = joint_limits(&skeleton).into_iter().find(|l| l.joint == elbow).unwrap();
         *bent.rotation_mut(elbow) = UnitQuaternion::from_scaled_axis(limit.axis * 3.0) * t.rotation(elbow);
-        // world axes: what turns the elbow from where the T-pose has it
-        let told = world(&bent, elbow) * world(&t, elbow).inverse();
-        let (from_a, from_t) = (limit.beyond(&bent.rotation(elbow)), limit.from_rest(&t).beyond(&told));
+        // world axes: the turn of the elbow away from the T-pose
+        let turned = world(&bent, elbow) * world(&t, elbow).inverse();
+        let (from_a, from_t) = (limit.beyond(&bent.rotation(elbow)), limit.from_rest(&t).beyond(&turned));
         assert!((from_a - from_t).abs() < 0.05 && from_a > 0.1, "{from_a} {from_t}");
     }
 }

@@ -5,7 +5,7 @@ use crate::Pose;
 /// Poses of one skeleton at a constant rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
-    /// What the clip is called.
+    /// Name of the clip.
     pub name: String,
     /// Seconds between two poses; positive.
     pub frame_time: f64,

@@ -1,4 +1,4 @@
-//! What other systems call the joints.
+//! Names of the joints in other systems.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ pub enum JointNaming {
     Vrm,
     /// H-Anim (ISO/IEC 19774-1:2019, annex A): `l_shoulder`.
     HAnim,
-    /// Mixamo, which Unity, Unreal and Blender's add-ons map by themselves: `mixamorig:LeftArm`.
+    /// Mixamo, which Unity, Unreal and Blender's add-ons map automatically: `mixamorig:LeftArm`.
     Mixamo,
 }
 
@@ -51,10 +51,10 @@ const NAMES: [[&str; 3]; 29] = [
 ];
 
 impl JointNaming {
-    /// All of them.
+    /// All systems.
     pub const ALL: [Self; 3] = [Self::Vrm, Self::HAnim, Self::Mixamo];
 
-    /// What a joint is called.
+    /// The name of a joint.
     pub fn name(self, joint: Joint) -> String {
         let name = joint.name();
         let sides = [("left", "l_", "Left"), ("right", "r_", "Right"), ("", "", "")];

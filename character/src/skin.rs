@@ -1,11 +1,6 @@
 //! Which joints move a vertex, and how far.
 
-use nalgebra::Point3;
-use toile_geometry::Mesh;
-
-use crate::{CharacterError, Pose, Skeleton, skinning};
-
-/// At most this many joints move a vertex (what importers take).
+/// Maximum number of joints that move a vertex (the number that importers read).
 pub const INFLUENCES: usize = 4;
 
 /// Joint influences of each vertex: indices and weights, largest first, weights sum to 1, unused slots (0, 0).
@@ -18,7 +13,7 @@ pub struct SkinWeights {
 }
 
 impl SkinWeights {
-    /// How many vertices are weighted.
+    /// Number of weighted vertices.
     pub fn len(&self) -> usize {
         self.joints.len()
     }
@@ -72,42 +67,5 @@ impl SkinWeights {
             influences.extend(source.of(v as usize).map(|(j, w)| (j, w * b)));
         }
         self.push(&influences);
-    }
-}
-
-/// A mesh at rest with its skeleton and weights.
-#[derive(Debug, Clone)]
-pub struct SkinnedMesh {
-    /// The mesh in the skeleton's rest pose.
-    pub mesh: Mesh,
-    /// The skeleton it hangs on.
-    pub skeleton: Skeleton,
-    /// Weights of the mesh's vertices.
-    pub weights: SkinWeights,
-}
-
-impl SkinnedMesh {
-    /// Joins the parts.
-    ///
-    /// # Errors
-    /// [`CharacterError::Mismatch`] where mesh and weights differ in length.
-    pub fn new(mesh: Mesh, skeleton: Skeleton, weights: SkinWeights) -> Result<Self, CharacterError> {
-        if mesh.positions.len() != weights.len() {
-            let (v, w) = (mesh.positions.len(), weights.len());
-            return Err(CharacterError::Mismatch(format!("{v} vertices but weights for {w}")));
-        }
-        Ok(Self { mesh, skeleton, weights })
-    }
-
-    /// Vertex positions in `pose`.
-    pub fn posed(&self, pose: &Pose) -> Vec<Point3<f32>> {
-        skinning::skin(&self.mesh.positions, &self.weights, &pose.skinning_transforms(&self.skeleton))
-    }
-
-    /// The mesh in `pose`, normals recomputed.
-    pub fn posed_mesh(&self, pose: &Pose) -> Mesh {
-        let mut mesh = Mesh { positions: self.posed(pose), normals: Vec::new(), ..self.mesh.clone() };
-        mesh.recompute_normals();
-        mesh
     }
 }

@@ -1,6 +1,6 @@
 //! Areas of triangles and of vertices.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::Mesh;
 
@@ -8,12 +8,6 @@ use crate::Mesh;
 #[inline]
 pub fn triangle_area([a, b, c]: [Point3<f32>; 3]) -> f32 {
     0.5 * (b - a).cross(&(c - a)).norm()
-}
-
-/// Twice the area of a triangle, in f64.
-#[inline]
-pub(crate) fn double_area([a, b, c]: [Vector3<f64>; 3]) -> f64 {
-    (b - a).cross(&(c - a)).norm()
 }
 
 /// The area that each vertex stands for: a third of the triangles around it, square metres.

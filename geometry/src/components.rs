@@ -18,7 +18,7 @@ pub struct Piece {
     pub high: Point3<f32>,
 }
 
-/// The connected piece with the largest area, and how many pieces there were.
+/// The connected piece with the largest area, and the number of pieces before.
 pub fn largest_component(mesh: &Mesh) -> (Mesh, usize) {
     keep_components(mesh, |pieces| {
         let largest = pieces.iter().map(|p| p.area).fold(0.0, f64::max);
@@ -27,7 +27,7 @@ pub fn largest_component(mesh: &Mesh) -> (Mesh, usize) {
     })
 }
 
-/// Keeps the connected pieces that `choose` says true for, and tells how many there were.
+/// Keeps the connected pieces for which `choose` holds; also returns the number of pieces before.
 pub fn keep_components(mesh: &Mesh, choose: impl FnOnce(&[Piece]) -> Vec<bool>) -> (Mesh, usize) {
     let (label, count) = vertex_components(mesh.positions.len(), &mesh.triangles);
     let mut all: Vec<Option<Piece>> = vec![None; count];
@@ -91,7 +91,7 @@ fn part_fans(mesh: Mesh) -> Mesh {
 }
 
 /// True where a walk over shared edges from the first of a vertex's triangles reaches all; false where not, or where
-/// there are too many to tell fast.
+/// there are too many to check quickly.
 fn is_one_fan(triangles: &[[u32; 3]], around: &[u32], v: u32) -> bool {
     if around.len() > 64 {
         return false;

@@ -56,7 +56,7 @@ impl Element {
     pub fn normal(self, x: f32, y: f32) -> [f32; 3] {
         let [_, facing, nx, ny] = self.parts();
         let rough = facing - nx * x - ny * y;
-        // The root of what is left of one is finer, but not where it is small.
+        // The root of the remainder is finer, but not where it is small.
         let square = 1.0 - nx * nx - ny * ny;
         [nx, ny, if square > 0.1 { square.sqrt().copysign(rough) } else { rough }]
     }

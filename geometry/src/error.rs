@@ -1,4 +1,4 @@
-//! What can go wrong with geometry and its files.
+//! Errors of geometry and its files.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ pub enum GeometryError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A file is not what its format says.
@@ -18,7 +18,7 @@ pub enum GeometryError {
     Format {
         /// The file.
         path: PathBuf,
-        /// What is wrong and where.
+        /// The reason and the place.
         reason: String,
     },
     /// A mesh breaks its own rules.

@@ -7,8 +7,8 @@ use crate::{Mesh, holes};
 
 mod loops;
 
-/// The mesh without those handles that a loop of at most `longest` (metres) goes around or through, and how many were
-/// cut. New vertices are marked as by [`holes::fill_holes`]. The mesh must be an oriented manifold, with or without
+/// The mesh without those handles that a loop of at most `longest` (metres) goes around or through, and the number that
+/// was cut. New vertices are marked as by [`holes::fill_holes`]. The mesh must be an oriented manifold, with or without
 /// borders ([`crate::components::make_manifold`]); loops that touch a border are left, and the search ends at the first
 /// handle that cannot be closed.
 pub fn cut_handles(mesh: &Mesh, longest: f32) -> (Mesh, usize) {
@@ -22,8 +22,8 @@ pub fn cut_handles(mesh: &Mesh, longest: f32) -> (Mesh, usize) {
     (out, count)
 }
 
-/// The mesh cut along a simple cycle of inner vertices, both rims closed; `None` where its surroundings are no manifold
-/// or a rim cannot be closed.
+/// The mesh cut along a simple cycle of inner vertices, both rims closed; `None` where its surroundings are not a
+/// manifold or a rim cannot be closed.
 fn cut_along(mesh: &Mesh, cycle: &[u32]) -> Option<Mesh> {
     let mut triangle_of_side = BTreeMap::new();
     for (t, tri) in mesh.triangles.iter().enumerate() {
@@ -98,7 +98,7 @@ mod tests {
     fn handles_longer_than_asked_for_and_other_holes_stay() {
         let ring = torus();
         assert_eq!(cut_handles(&ring, 0.1).1, 0);
-        // The border of a hole is no handle.
+        // The border of a hole is not a handle.
         let (open, _) = ring.filter_triangles(|t| t > 3);
         let rims = boundary_loops(&open.triangles).len();
         let (cut, count) = cut_handles(&open, 0.2);

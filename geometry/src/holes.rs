@@ -1,4 +1,4 @@
-//! Closing holes by fair patches: a triangulation of least area, refined to the surroundings' density and relaxed to
+//! Closing holes by fair patches: a triangulation with minimum area, refined to the surroundings' density and relaxed to
 //! a thin plate (after Liepa 2003, "Filling holes in meshes").
 
 use std::collections::BTreeSet;
@@ -19,10 +19,10 @@ use patch::Patch;
 /// Name of the vertex attribute that is 1 where a patch was put in.
 pub const FILLED: &str = "filled";
 
-/// A plate with more than this many times the membrane's area bulges over a hole that is no cap: it is not used.
+/// A plate with more than this many times the membrane's area bulges too far over the hole and is not used.
 const MOST_BULGE: f64 = 1.2;
 
-/// What was closed.
+/// Holes that were closed and left open.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Filled {
     /// Holes closed.
@@ -36,12 +36,12 @@ pub struct Filled {
 /// Closes every hole whose border is at most `max_length` long (metres) by a thin plate that continues the
 /// surroundings, or, where that would bulge, by a taut membrane. New vertices get the attribute [`FILLED`] = 1 (old
 /// ones 0), and colours and attributes that run on smoothly from the border. The mesh must be a manifold
-/// ([`crate::components::make_manifold`]). Normals are computed anew where there were any.
+/// ([`crate::components::make_manifold`]). Normals are recomputed where there were any.
 pub fn fill_holes(mesh: &Mesh, max_length: f32) -> (Mesh, Filled) {
     fill_where(mesh, |border| loop_length(&mesh.positions, border) <= max_length)
 }
 
-/// As [`fill_holes`], the holes whose border is `wanted`.
+/// As [`fill_holes`], for the holes for whose border `wanted` holds.
 pub(crate) fn fill_where(mesh: &Mesh, wanted: impl Fn(&[u32]) -> bool + Sync) -> (Mesh, Filled) {
     let mut out = mesh.clone();
     out.attributes.entry(FILLED.into()).or_insert_with(|| vec![0.0; mesh.positions.len()]);

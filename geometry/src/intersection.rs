@@ -1,4 +1,4 @@
-//! Which triangles of two meshes, or of one, cut through one another; decided with exact signs.
+//! Triangles of two meshes, or of one, that cut through one another; decided with exact signs.
 
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -8,7 +8,7 @@ use crate::{Mesh, bvh::Bvh, predicates::orientation};
 /// Triangles in a parallel chunk.
 const CHUNK: usize = 1024;
 
-/// True where triangles `x` and `y` properly cross: an edge of one passes through the other. Touching is no crossing.
+/// True where triangles `x` and `y` properly cross: an edge of one passes through the other. Triangles that only touch do not cross.
 pub fn triangles_cross(x: &[Point3<f32>; 3], y: &[Point3<f32>; 3]) -> bool {
     (0..3).any(|k| segment_crosses(&x[k], &x[(k + 1) % 3], y) || segment_crosses(&y[k], &y[(k + 1) % 3], x))
 }
@@ -55,7 +55,7 @@ pub fn self_crossings(mesh: &Mesh, bvh: &Bvh) -> Vec<[u32; 2]> {
     })
 }
 
-/// As [`self_crossings`], of pairs that have one of `some` triangles or two.
+/// As [`self_crossings`], for pairs of which at least one is among `some`.
 pub fn self_crossings_among(mesh: &Mesh, some: &[u32], bvh: &Bvh) -> Vec<[u32; 2]> {
     let mut pairs = collect(some, |t, found| {
         let x = mesh.corners(t as usize);

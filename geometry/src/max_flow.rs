@@ -5,7 +5,7 @@
 const NONE: u32 = u32::MAX;
 /// Parent is the node's own terminal.
 const TERMINAL: u32 = u32::MAX - 1;
-/// Parent was cut off and is looked for.
+/// The parent was cut off; a new one is being searched for.
 const ORPHAN: u32 = u32::MAX - 2;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +15,7 @@ enum Tree {
     Sink,
 }
 
-/// A graph whose minimum cut is wanted. Capacities are integers, so that the answer is exact and always the same.
+/// A graph with its capacities, which are integers, so that the cut is exact and always the same.
 #[derive(Debug, Clone)]
 pub struct GraphCut {
     /// Source capacity minus sink capacity that is left at each node.
@@ -36,7 +36,7 @@ pub struct GraphCut {
 }
 
 impl GraphCut {
-    /// A graph of `nodes` nodes without edges; `edges` is a hint of how many will come.
+    /// A graph of `nodes` nodes without edges; `edges` is a hint of their number.
     pub fn new(nodes: usize, edges: usize) -> Self {
         Self {
             terminal: vec![0; nodes],

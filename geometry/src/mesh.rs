@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::{GeometryError, Rigid, areas::double_area};
+use crate::{GeometryError, Rigid, triangle::double_area};
 
 /// An indexed triangle mesh, counter-clockwise seen from outside.
 ///
@@ -42,7 +42,7 @@ impl Mesh {
     pub fn validate(&self) -> Result<(), GeometryError> {
         let count = self.positions.len();
         if let Some(i) = self.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= count)) {
-            return Err(GeometryError::Mesh(format!("triangle {i} names a vertex beyond the {count} there are")));
+            return Err(GeometryError::Mesh(format!("triangle {i} names a vertex beyond the last of {count}")));
         }
         if let Some(i) = self.positions.iter().position(|p| !p.coords.iter().all(|c| c.is_finite())) {
             return Err(GeometryError::Mesh(format!("vertex {i} is not finite")));

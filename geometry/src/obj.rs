@@ -4,36 +4,58 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
-use crate::{GeometryError, Mesh};
+use crate::{GeometryError, Mesh, file::read_limited};
 
-/// Reads positions and faces of an OBJ file; materials, texture coordinates and normals are left out.
+/// Maximum size of a file, bytes: text is some three times as long as the same mesh in PLY.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// Reads positions, faces and vertex colours (three numbers from 0 to 1 behind the position, as MeshLab writes them) of an
+/// OBJ file; materials, texture coordinates and normals are left out.
 ///
 /// # Errors
 /// [`GeometryError::Io`] where the file cannot be read, [`GeometryError::Format`] with the line that is wrong.
 pub fn read(path: &Path) -> Result<Mesh, GeometryError> {
-    let text = std::fs::read_to_string(path).map_err(|e| GeometryError::io(path, e))?;
+    decode(&read_limited(path, MAX_BYTES)?).map_err(|reason| GeometryError::format(path, reason))
+}
+
+/// Decodes OBJ text as [`read`] does. Bytes that are not UTF-8 are allowed in comments and names.
+///
+/// # Errors
+/// A sentence with the line that is wrong.
+pub fn decode(bytes: &[u8]) -> Result<Mesh, String> {
+    let text = String::from_utf8_lossy(bytes);
     let mut mesh = Mesh::default();
-    for (number, line) in text.lines().enumerate() {
-        let wrong = || GeometryError::format(path, format!("line {}: cannot read \"{line}\"", number + 1));
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => {
-                let numbers: Vec<f32> = words.take(3).filter_map(|w| w.parse().ok()).collect();
-                let [x, y, z] = numbers[..] else { return Err(wrong()) };
-                mesh.positions.push(Point3::new(x, y, z));
-            }
-            Some("f") => {
-                let face: Option<Vec<u32>> = words.map(|w| vertex_index(w, mesh.positions.len())).collect();
-                let face = face.filter(|f| f.len() >= 3).ok_or_else(wrong)?;
-                mesh.triangles.extend((1..face.len() - 1).map(|i| [face[0], face[i], face[i + 1]]));
-            }
-            _ => {}
-        }
+    for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+        read_line(line, &mut mesh).ok_or_else(|| format!("line {}: cannot read \"{line}\"", number + 1))?;
     }
-    mesh.validate().map_err(|e| GeometryError::format(path, e.to_string()))?;
+    if mesh.colors.len() != mesh.positions.len() {
+        mesh.colors.clear(); // not every vertex has one
+    }
+    mesh.validate().map_err(|e| e.to_string())?;
     Ok(mesh)
 }
 
+fn read_line(line: &str, mesh: &mut Mesh) -> Option<()> {
+    let mut words = line.split_whitespace();
+    match words.next() {
+        Some("v") => {
+            let mut next = || words.next()?.parse::<f32>().ok();
+            mesh.positions.push(Point3::new(next()?, next()?, next()?));
+            if let (Some(r), Some(g), Some(b)) = (next(), next(), next()) {
+                mesh.colors.push([r, g, b].map(|x| (x * 255.0).round() as u8));
+            }
+        }
+        Some("f") => {
+            let face: Vec<u32> = words.map(|w| vertex_index(w, mesh.positions.len())).collect::<Option<_>>()?;
+            let fan = 1..face.len().checked_sub(1).filter(|&last| last >= 2)?;
+            mesh.triangles.extend(fan.map(|i| [face[0], face[i], face[i + 1]]));
+        }
+        _ => {}
+    }
+    Some(())
+}
+
+/// Index of a face's corner, counted from 0: OBJ counts from 1, and from the last vertex backwards with negative numbers.
 fn vertex_index(word: &str, count: usize) -> Option<u32> {
     let index: i64 = word.split('/').next()?.parse().ok()?;
     let zero_based = if index < 0 { count as i64 + index } else { index - 1 };
@@ -53,4 +75,29 @@ pub fn write(path: &Path, mesh: &Mesh) -> Result<(), GeometryError> {
         text.push_str(&format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
     }
     std::fs::write(path, text).map_err(|e| GeometryError::io(path, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn polygons_counted_from_either_end_become_triangles() {
+        let text = "\u{feff}# four corners\r\no quad\r\nv 0 0 0\r\nv 1 0 0 1.0\r\nv 1 1 0\r\nv 0 1 0\r\n\
+            vn 0 0 1\r\nf 1//1 2//1 3//1 4//1\r\nf -4/2/1 -3/1/1 -2/3/1\r\n";
+        let mesh = decode(text.as_bytes()).unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
+        assert_eq!(mesh.positions[2], Point3::new(1.0, 1.0, 0.0));
+    }
+
+    #[test]
+    fn lines_that_are_wrong_are_named_and_other_bytes_are_allowed() {
+        let complaint = |body: &str| decode(format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{body}").as_bytes()).unwrap_err();
+        for wrong in ["v 1 2", "v 1 x 2", "f 1 2", "f 0 1 2", "f -9 1 2", "f 1 2 99999999999999999999"] {
+            assert!(complaint(wrong).contains("line 4"), "{wrong}");
+        }
+        assert!(complaint("f 1 2 4").contains("triangle 0"));
+        assert!(complaint("v nan 0 0").contains("vertex 3"));
+        assert!(decode(b"# M\xfcller\nv 0 0 0\n").is_ok());
+    }
 }

@@ -39,7 +39,7 @@ fn divide<T: Scalar>(
     divide(points, &near, blocked, out) && divide(points, &far, blocked, out)
 }
 
-/// The free chord that is shortest for the way around that it saves, with at least a quarter of the ring each side.
+/// The shortest free chord with at least a quarter of the ring on each side.
 fn best_chord<T: Scalar>(
     points: &[Point3<T>],
     ring: &[usize],

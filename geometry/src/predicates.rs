@@ -7,7 +7,7 @@ use nalgebra::Point3;
 const FILTER: f64 = 1e-14;
 
 /// Sign of det[b − a, c − a, d − a]: +1, 0 or −1, exact for all finite f32 input (no underflow: coordinates beyond
-/// 1e-30 of one another are taken as they are).
+/// 1e-30 of one another are not treated specially).
 pub fn orientation(a: &Point3<f32>, b: &Point3<f32>, c: &Point3<f32>, d: &Point3<f32>) -> i8 {
     let [pa, pb, pc, pd] = [a, b, c, d].map(|p| p.cast::<f64>());
     let (u, v, w) = (pb - pa, pc - pa, pd - pa);

@@ -23,7 +23,7 @@ pub struct Camera {
     pub camera_from_world: Rigid,
 }
 
-/// What a camera sees of some triangles, row by row.
+/// The triangles that a camera sees, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
     /// Columns.

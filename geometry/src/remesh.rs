@@ -1,5 +1,5 @@
 //! Isotropic remeshing (Botsch and Kobbelt 2004): long edges split, short ones collapsed, valences evened out,
-//! vertices relaxed in the tangent plane and put back onto the surface. Open rims stay on their curve.
+//! vertices relaxed in the tangent plane and projected back onto the surface. Open rims stay on their curve.
 
 use std::collections::BTreeMap;
 

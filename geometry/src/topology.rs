@@ -7,7 +7,7 @@ use nalgebra::Point3;
 pub struct Edges {
     /// Vertex pairs, smaller index first, in ascending order.
     pub vertices: Vec<[u32; 2]>,
-    /// How many triangles use each edge: 1 on a boundary, 2 inside, more where the mesh is not manifold.
+    /// Number of triangles that use each edge: 1 on a boundary, 2 inside, more where the mesh is not manifold.
     pub uses: Vec<u32>,
     /// Edge index of each triangle's side k (corners k and k + 1).
     pub of_triangle: Vec<[u32; 3]>,
@@ -135,7 +135,7 @@ fn rows(count: usize, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> (Vec<u
     (starts, items)
 }
 
-/// Component of each vertex (numbered by first vertex) and how many there are; lone vertices count too.
+/// Component of each vertex (numbered by first vertex) and the number of components; vertices without triangles count too.
 pub fn vertex_components(vertex_count: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, usize) {
     let mut parent: Vec<u32> = (0..vertex_count as u32).collect();
     for t in triangles {
@@ -172,7 +172,7 @@ fn union(parent: &mut [u32], a: u32, b: u32) {
 
 /// Boundary loops as closed vertex cycles along the triangles' own direction, in order of their first vertex.
 ///
-/// Where several loops touch in one vertex they are walked apart as far as the directed edges tell.
+/// Where several loops touch in one vertex they are separated as far as the directions of the edges allow.
 pub fn boundary_loops(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let edges = Edges::new(triangles);
     let mut next: std::collections::BTreeMap<u32, Vec<u32>> = std::collections::BTreeMap::new();

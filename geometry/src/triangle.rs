@@ -2,6 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 
+/// Twice the area of a triangle, in f64.
+#[inline]
+pub(crate) fn double_area([a, b, c]: [Vector3<f64>; 3]) -> f64 {
+    (b - a).cross(&(c - a)).norm()
+}
+
 /// Barycentric coordinates of the point of triangle `abc` closest to `p` (Ericson, Real-Time Collision
 /// Detection, §5.1.5). The coordinates are non-negative and sum to 1, also for degenerate triangles.
 pub fn closest_barycentric(p: &Point3<f32>, a: &Point3<f32>, b: &Point3<f32>, c: &Point3<f32>) -> [f32; 3] {

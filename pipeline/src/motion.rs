@@ -42,6 +42,7 @@ fn read(path: &Path) -> Result<Bvh, PipelineError> {
         AnimationError::Io { path, source } => PipelineError::io(&path, source),
         // The line and the file's name are in the message already.
         AnimationError::Bvh { line, reason, .. } => PipelineError::format(path, format!("line {line}: {reason}")),
+        AnimationError::File(error) => error.into(),
         other => PipelineError::stage(path, other),
     })
 }

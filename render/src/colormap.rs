@@ -13,8 +13,8 @@ const SAMPLES: [[u8; 3]; 9] = [
     [253, 231, 37],
 ];
 
-/// Colour of `value` on a scale from `range.0` (dark) to `range.1` (bright); values outside are clamped, values that
-/// are no number are magenta.
+/// Colour of `value` on a scale from `range.0` (dark) to `range.1` (bright); values outside are clamped, NaN is
+/// magenta.
 pub fn viridis(value: f32, range: (f32, f32)) -> [u8; 3] {
     if !value.is_finite() {
         return [255, 0, 255];

@@ -1,4 +1,4 @@
-//! What can go wrong while drawing.
+//! Errors of drawing.
 
 /// Errors of the render crate.
 #[derive(Debug, thiserror::Error)]
@@ -8,7 +8,7 @@ pub enum RenderError {
     Mesh {
         /// Its place in the list.
         index: usize,
-        /// What is wrong.
+        /// The reason.
         source: toile_geometry::GeometryError,
     },
     /// A mesh was to be coloured by an attribute that it does not have.
@@ -16,7 +16,7 @@ pub enum RenderError {
     Attribute {
         /// Its place in the list.
         index: usize,
-        /// The attribute asked for.
+        /// The attribute that was requested.
         name: String,
     },
     /// There is nothing to draw or no pixel to draw on.

@@ -14,8 +14,8 @@ pub fn height(scale: u32) -> u32 {
     GLYPH_HEIGHT * scale
 }
 
-/// Draws a line of text with its top left corner at (x, y); letters are capitals of 5 × 7 squares of `scale` pixels. What
-/// falls outside is left out.
+/// Draws a line of text with its top left corner at (x, y); letters are capitals of 5 × 7 squares of `scale` pixels. Pixels
+/// outside the picture are left out.
 pub fn draw(image: &mut RgbImage, x: u32, y: u32, text: &str, scale: u32, color: [u8; 3]) {
     for (i, character) in text.chars().enumerate() {
         let rows = glyph(character);

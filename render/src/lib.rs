@@ -1,6 +1,6 @@
 //! One small CPU rasteriser for reports, sensors and tests.
 //!
-//! - [`rasterize`] (of the geometry crate): meshes seen by a pinhole camera as depth, triangle and barycentric coordinates a pixel;
+//! - [`rasterize`] (from the geometry crate): meshes seen by a pinhole camera;
 //! - [`shade`]: hemisphere and key light on sRGB albedo;
 //! - [`picture::picture`]: meshes fitted into a [`View`], coloured by their vertices, plain, as clay or by an attribute;
 //! - [`sheet::contact_sheet`], [`sheet::scale_bar`], [`label::draw`]: pictures side by side, legends, small text;
@@ -24,7 +24,7 @@
 //! ```
 
 pub mod colormap;
-pub mod error;
+mod error;
 mod font;
 pub mod label;
 pub mod picture;

@@ -20,7 +20,7 @@ pub const BACKGROUND: [u8; 3] = [244, 244, 242];
 /// Samples a pixel along each axis.
 const SAMPLES: u32 = 2;
 
-/// What colour a mesh is drawn in.
+/// Colour of a mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Paint {
     /// Its vertex colours; clay where it has none.
@@ -36,11 +36,11 @@ pub enum Paint {
 /// A mesh in a picture.
 #[derive(Debug, Clone)]
 pub struct Drawn<'a> {
-    /// What is drawn, in world coordinates.
+    /// The mesh, in world coordinates.
     pub mesh: &'a Mesh,
-    /// In what colour.
+    /// Its colour.
     pub paint: Paint,
-    /// 1 hides what is behind, 0 shows nothing of the mesh.
+    /// From 0 (invisible) to 1 (hides everything behind it).
     pub opacity: f32,
 }
 

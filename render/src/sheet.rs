@@ -12,10 +12,10 @@ const GAP: u32 = 6;
 const SCALE: u32 = 2;
 
 /// Tiles in rows of `columns`, each with its label above it. Tiles may differ in size: every cell is as large as the
-/// largest. Where no label has a letter there is no line for labels.
+/// largest. Without any label there is no line for labels.
 ///
 /// # Errors
-/// [`RenderError::Empty`] without a tile.
+/// [`RenderError::Empty`] without tiles.
 pub fn contact_sheet(tiles: &[(String, RgbImage)], columns: usize) -> Result<RgbImage, RenderError> {
     let width = tiles.iter().map(|t| t.1.width()).max().filter(|&w| w > 0);
     let (Some(width), columns) = (width, columns.clamp(1, tiles.len().max(1))) else {
@@ -35,7 +35,7 @@ pub fn contact_sheet(tiles: &[(String, RgbImage)], columns: usize) -> Result<Rgb
     Ok(sheet)
 }
 
-/// The picture with a colour scale under it: the ends of `range` and what it measures, such as `mm`.
+/// The picture with a colour scale under it: the ends of `range` and its unit, such as `mm`.
 pub fn scale_bar(picture: &RgbImage, range: (f32, f32), unit: &str) -> RgbImage {
     let bar = label::height(SCALE);
     let mut out = RgbImage::from_pixel(picture.width(), picture.height() + 2 * bar + 3 * GAP, Rgb(BACKGROUND));
@@ -53,7 +53,7 @@ pub fn scale_bar(picture: &RgbImage, range: (f32, f32), unit: &str) -> RgbImage 
     out
 }
 
-/// A number in few letters.
+/// A number in a few characters.
 fn short(value: f32) -> String {
     let digits = match value.abs() {
         v if v >= 100.0 || v == v.round() => 0,

@@ -1,4 +1,4 @@
-//! From where a picture is taken.
+//! Viewpoints of pictures.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use toile_geometry::{Rigid, camera::PinholeCamera, raster::Camera};
@@ -15,7 +15,7 @@ pub struct View {
     pub elevation: f64,
     /// Vertical field of view, radians.
     pub field: f64,
-    /// World box (lowest, highest corner) to fit instead of what is drawn: the same scale in several pictures.
+    /// World box (lowest, highest corner) to fit instead of the meshes: the same scale in several pictures.
     pub bounds: Option<(Point3<f32>, Point3<f32>)>,
 }
 

@@ -61,7 +61,7 @@ impl Quadric {
         Some(Matrix3::new(cxx, cxy, cxz, cxy, cyy, cyz, cxz, cyz, czz) / determinant)
     }
 
-    /// The point of least error, given the matrix part's inverse.
+    /// The point with the minimum error, given the matrix part's inverse.
     pub(super) fn minimum(&self, inverse: &Matrix3<f64>) -> Point3<f64> {
         Point3::from(-(inverse * Vector3::from(self.b)))
     }

@@ -1,6 +1,6 @@
 //! What lies around an edge.
 
-use super::Collapser;
+use super::corners::Corners;
 
 /// Triangles and neighbours around the two ends of an edge; kept between collapses.
 #[derive(Default)]
@@ -12,14 +12,14 @@ pub(super) struct Rings {
 
 impl Rings {
     /// Triangles at both ends of an edge (shared), at one of them, and the neighbours of each.
-    pub(super) fn gather(&mut self, state: &Collapser, u: u32, v: u32) {
+    pub(super) fn gather(&mut self, corners: &Corners, u: u32, v: u32) {
         self.shared.clear();
         for (k, (from, other)) in [(u, v), (v, u)].into_iter().enumerate() {
             let (triangles, neighbors) = (&mut self.triangles[k], &mut self.neighbors[k]);
             triangles.clear();
             neighbors.clear();
-            for t in state.triangles_at(from) {
-                let tri = state.triangles[t as usize];
+            for t in corners.triangles_at(from) {
+                let tri = corners.triangles[t as usize];
                 if !tri.contains(&other) {
                     triangles.push(t);
                 } else if k == 0 {

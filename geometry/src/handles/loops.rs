@@ -33,7 +33,7 @@ pub fn shortest(mesh: &Mesh, longest: f32) -> Option<Vec<u32>> {
     search.found
 }
 
-/// For each edge, which of the dual loops that generate the homology cross it: a bit each, at most 64.
+/// For each edge, which of the dual loops that generate the homology cross it: one bit each, at most 64.
 fn crossed_generators(mesh: &Mesh, edges: &Edges) -> Vec<u64> {
     let sides = dual_sides(mesh, edges);
     let faces = sides.iter().flatten().max().map_or(0, |&f| f as usize + 1);
@@ -65,7 +65,7 @@ fn dual_sides(mesh: &Mesh, edges: &Edges) -> Vec<[u32; 2]> {
             }
         }
     }
-    // What a broken border leaves without a face closes on itself.
+    // An edge that a broken border leaves without a face closes on itself.
     sides.iter_mut().filter(|s| s[1] == NONE).for_each(|s| s[1] = s[0]);
     sides
 }

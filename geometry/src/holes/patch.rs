@@ -12,7 +12,7 @@ const ROUNDS: usize = 12;
 const LONG: f64 = 1.5;
 /// Passes of tightening.
 const TIGHTENING: usize = 200;
-/// Most vertices of a patch.
+/// Maximum number of vertices of a patch.
 const MOST_VERTICES: usize = 20_000;
 
 /// Vertices (border first, in its order) and triangles of a patch.

@@ -7,16 +7,16 @@ use nalgebra::{Point3, Vector3};
 use super::patch::Patch;
 use crate::{
     Mesh,
-    areas::double_area,
     laplacian::{Row, cotangent_laplacian},
     topology::VertexTriangles,
+    triangle::double_area,
 };
 
 /// Rings of the surroundings that the plate continues.
 const RINGS: usize = 2;
-/// Most conjugate-gradient steps.
+/// Maximum number of conjugate-gradient steps.
 const STEPS: usize = 600;
-/// Border vertices that give an inner vertex its colour, at most.
+/// Maximum number of border vertices that give an inner vertex its colour.
 const NEAREST: usize = 12;
 
 /// The patch, its border and the rings of mesh around, as one system.
@@ -28,7 +28,7 @@ struct Plate {
 }
 
 /// Moves the inner vertices so that the area-weighted square of the cotangent Laplacian over patch and border is
-/// least, with the rings of mesh around the hole held: a thin plate that runs on without a crease.
+/// minimal, with the rings of mesh around the hole held: a thin plate that runs on without a crease.
 pub(super) fn relax(patch: &mut Patch, mesh: &Mesh, around: &VertexTriangles, border: &[u32]) {
     if patch.positions.len() == patch.border {
         return;

@@ -1,11 +1,12 @@
-//! Where a motion stands: on the floor, starting at the origin, or staying there.
+//! The place of a motion: on the floor, starting at the origin, or staying there.
 
 use nalgebra::Vector3;
 use toile_character::{Joint, Pose, Skeleton, feet::foot_height};
+use toile_geometry::statistics::{Rank, median, quantile_by};
 
 /// Moves the whole motion so that standing feet stand on the floor and the hips start above the origin. Where the
-/// source's hips never rise or sink, which hand-keyed cycles do, each pose is set on the floor by itself.
-pub(crate) fn place(target: &Skeleton, poses: &mut [Pose]) {
+/// source's hips never rise or sink, which hand-keyed cycles do, each pose is set on the floor separately.
+pub(super) fn place(target: &Skeleton, poses: &mut [Pose]) {
     const FIXED_HEIGHT: f64 = 1e-4; // metres
     let heights: Vec<f64> = poses.iter().map(|p| lowest_foot(target, p).1).collect();
     let hips = |p: &Pose| target.position(Joint::Hips).y + p.translation.y;
@@ -32,12 +33,11 @@ fn floor_height(target: &Skeleton, poses: &[Pose]) -> f64 {
     standing.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let count = ((standing.len() as f64 * STANDING_SHARE).ceil() as usize).min(standing.len());
     let mut heights: Vec<f64> = standing[..count].iter().map(|s| s.1).collect();
-    heights.sort_by(f64::total_cmp);
-    heights.get(heights.len() / 2).copied().unwrap_or(0.0)
+    median(&mut heights).unwrap_or(0.0)
 }
 
-/// Takes the travel over the ground out: the path of the hips, smoothed over about a step, stays at the origin.
-pub(crate) fn keep_in_place(target: &Skeleton, poses: &mut [Pose], frame_time: f64) {
+/// Removes the travel over the ground: the path of the hips, smoothed over about a step, stays at the origin.
+pub(super) fn keep_in_place(target: &Skeleton, poses: &mut [Pose], frame_time: f64) {
     const SMOOTHING: f64 = 0.6; // seconds to either side: about a step
     let reach = (SMOOTHING / frame_time).round().max(1.0) as usize;
     let hips = target.position(Joint::Hips).coords;
@@ -50,12 +50,10 @@ pub(crate) fn keep_in_place(target: &Skeleton, poses: &mut [Pose], frame_time: f
     }
 }
 
-/// 98th percentile of how far the lowest foot is below the floor, metres; 0 where none is.
-pub(crate) fn depth_below_floor(target: &Skeleton, poses: &[Pose]) -> f64 {
+/// 98th percentile of how far the lowest foot is below the floor, metres; 0 where it never is.
+pub(super) fn depth_below_floor(target: &Skeleton, poses: &[Pose]) -> f64 {
     let mut heights: Vec<f64> = poses.iter().map(|p| lowest_foot(target, p).1).collect();
-    heights.sort_by(f64::total_cmp);
-    let at = (heights.len() as f64 * 0.02) as usize;
-    heights.get(at).map_or(0.0, |h| (-h).max(0.0))
+    quantile_by(&mut heights, 0.02, Rank::Count).map_or(0.0, |h| (-h).max(0.0))
 }
 
 /// The lower foot and the height of its sole above the floor.

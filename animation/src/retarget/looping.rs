@@ -2,11 +2,11 @@
 
 use toile_character::{Motion, Pose};
 
-/// Seconds over which the end goes over into the start.
+/// Seconds over which the end is blended into the start.
 const BLEND: f64 = 0.25;
 
 /// The motion cut at the pose of its second half that is most like its first pose and blended into it, so that
-/// its last pose is its first. Best given a motion that stays in place; a motion of fewer than four poses is
+/// its last pose is its first. It works best on a motion that stays in place; a motion of fewer than four poses is
 /// returned as it is.
 pub fn close_loop(motion: &Motion) -> Motion {
     let count = motion.poses.len();

@@ -1,9 +1,9 @@
-//! What a joint's name says: which side, which part of the body, which segment of a chain.
+//! Names of joints taken apart: side, part of the body, segment of a chain.
 //!
 //! Reads the names of VRM, Unity, Mixamo, H-Anim, MakeHuman, CMU conversions, Bandai Namco, Biped, Unreal, SMPL
 //! and their like: sides as word, letter, prefix or suffix; any separators; camel case or not.
 
-/// Which side of the body a name tells.
+/// Side of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Side {
     Left,
@@ -14,7 +14,7 @@ pub(crate) enum Side {
 /// A name taken apart.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct JointName {
-    /// The side it tells.
+    /// The side that it names.
     pub side: Side,
     /// The words that are left without side, digits and decoration, joined: `upperleg`.
     pub part: String,
@@ -36,7 +36,7 @@ pub(crate) const HEAD: &[&str] = &["head", "skullbase", "skull"];
 /// Finger names by finger, thumb first; MakeHuman and DAZ count `finger1` (the thumb) to `finger5`.
 const FINGERS: [&[&str]; 5] = [&["thumb"], &["index"], &["middle", "mid"], &["ring"], &["little", "pinky"]];
 
-/// Words that decorate names and tell nothing.
+/// Words that decorate names and carry no meaning.
 const NOISE: &[&str] =
     &["joint", "jnt", "bone", "bip", "j", "c", "def", "org", "valve", "biped", "mixamorig", "character", "skel"];
 
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn fingers_and_their_segments_are_told() {
+    fn fingers_and_their_segments_are_found() {
         let cases = [
             ("finger2-1.l", Some((1, 1))),
             ("LeftHandIndex3", Some((1, 3))),

@@ -1,33 +1,21 @@
-//! How a source skeleton's joint frames stand to the target's: one constant rotation a joint.
+//! The rotations between the joint frames of source and target: one constant for each joint.
 //!
 //! Two skeletons agree on nothing but the body that they describe: rest poses are T, A, arms down or, where bones
-//! lie along their own axes, no pose at all. So a moment is taken in which both are known to do the same, the
+//! lie along their own axes, no pose at all. They are compared in a moment in which both are known to do the same, the
 //! *reference*: the source's zero pose where its geometry shows a standing person, else the most upright frame of
-//! the motion. There the target is turned until its limbs point like the source's, with the least turn from its
-//! own rest, and what is left between the joint frames holds for the whole motion.
+//! the motion. There the target is turned until its limbs point like the source's, with the smallest turn from its
+//! own rest; the rotations between the joint frames that remain hold for the whole motion.
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use toile_character::{JOINT_COUNT, Joint, Skeleton};
-use toile_geometry::direction::{align, nearest_axis, swing, unit_or};
+use toile_geometry::direction::{align, swing, unit_or};
 
-use crate::{bvh::Bvh, source::Source, stance};
-
-/// `source_joint_from_target_joint` rotations and the source's up axis.
-#[derive(Debug, Clone)]
-pub(crate) struct Reference {
-    /// Up in the source's coordinates during the motion: a coordinate axis.
-    pub up: Vector3<f64>,
-    /// True where the source's zero pose was taken.
-    pub from_rest: bool,
-    pub pelvis: UnitQuaternion<f64>,
-    /// One a joint of [`Source::spine`].
-    pub spine: Vec<UnitQuaternion<f64>>,
-    /// One a joint of [`Source::neck`].
-    pub neck: Vec<UnitQuaternion<f64>>,
-    pub head: UnitQuaternion<f64>,
-    /// By [`Joint::index`], meaningful where the source has the limb joint.
-    pub limbs: Vec<UnitQuaternion<f64>>,
-}
+use super::{
+    constants::{Constants, bone},
+    moments::{leftward, most_upright_frame, motion_up, sampled, standing_body, torso},
+    stance,
+};
+use crate::{Bvh, skeleton::Source};
 
 /// Where the target's trunk is turned to in the reference, in source coordinates.
 struct Trunk {
@@ -39,7 +27,7 @@ struct Trunk {
 }
 
 /// Finds the constant rotations between the joint frames of `source` and of `target`.
-pub(crate) fn find_reference(bvh: &Bvh, source: &Source, target: &Skeleton) -> Reference {
+pub(super) fn find_reference(bvh: &Bvh, source: &Source, target: &Skeleton) -> Constants {
     let up = motion_up(bvh, source);
     let rest = bvh.rest_frames();
     if let Some(body) = standing_body(source, bvh, &rest) {
@@ -56,73 +44,6 @@ pub(crate) fn find_reference(bvh: &Bvh, source: &Source, target: &Skeleton) -> R
         stance::calibrate_foot(bvh, source, target, foot, &mut reference);
     }
     reference
-}
-
-/// Frames looked at when something is read off the whole motion.
-pub(crate) fn sampled(bvh: &Bvh) -> impl Iterator<Item = usize> {
-    const MOST: usize = 240;
-    let step = bvh.frames.len().div_ceil(MOST).max(1);
-    (0..bvh.frames.len()).step_by(step)
-}
-
-fn middle(source: &Source, left: Joint, world: &[Isometry3<f64>]) -> Point3<f64> {
-    nalgebra::center(&source.position(left, world), &source.position(left.mirrored(), world))
-}
-
-/// From right to left across the joint pair.
-fn leftward(source: &Source, left: Joint, world: &[Isometry3<f64>]) -> Vector3<f64> {
-    source.position(left, world) - source.position(left.mirrored(), world)
-}
-
-fn torso(source: &Source, world: &[Isometry3<f64>]) -> Vector3<f64> {
-    middle(source, Joint::LeftUpperArm, world) - middle(source, Joint::LeftUpperLeg, world)
-}
-
-/// The coordinate axis that people stand along during the motion.
-fn motion_up(bvh: &Bvh, source: &Source) -> Vector3<f64> {
-    let mut sum = Vector3::zeros();
-    for frame in sampled(bvh) {
-        let world = bvh.joint_frames(frame);
-        let ankles = nalgebra::center(
-            &source.ankle(Joint::LeftLowerLeg, bvh, &world),
-            &source.ankle(Joint::RightLowerLeg, bvh, &world),
-        );
-        sum += unit_or(&(middle(source, Joint::LeftUpperArm, &world) - ankles), &Vector3::zeros());
-    }
-    nearest_axis(&sum)
-}
-
-/// The body frame (left, up, front as x, y, z) of a zero pose, where it is the pose of a standing person.
-fn standing_body(source: &Source, bvh: &Bvh, rest: &[Isometry3<f64>]) -> Option<UnitQuaternion<f64>> {
-    use Joint::*;
-    let up = unit_or(&torso(source, rest), &Vector3::zeros());
-    let (hips, shoulders) = (leftward(source, LeftUpperLeg, rest), leftward(source, LeftUpperArm, rest));
-    let across = |v: &Vector3<f64>| unit_or(&(v - up * up.dot(v)), &Vector3::zeros());
-    let left = unit_or(&(across(&hips) + across(&shoulders)), &Vector3::zeros());
-    let mut sane = across(&hips).dot(&across(&shoulders)) > 0.7 && unit_or(&hips, &up).dot(&up).abs() < 0.5;
-    for (upper, lower, side) in [(LeftUpperLeg, LeftLowerLeg, 1.0), (RightUpperLeg, RightLowerLeg, -1.0)] {
-        let leg = unit_or(&(source.ankle(lower, bvh, rest) - source.position(upper, rest)), &up);
-        let (arm, elbow) = if side > 0.0 { (LeftUpperArm, LeftLowerArm) } else { (RightUpperArm, RightLowerArm) };
-        let arm = unit_or(&(source.position(elbow, rest) - source.position(arm, rest)), &up);
-        sane &= leg.dot(&up) < -0.7 && arm.dot(&left) * side > -0.3 && arm.dot(&up) < 0.7;
-    }
-    let snap = |v: Vector3<f64>| if v.dot(&nearest_axis(&v)) > 0.9 { nearest_axis(&v) } else { v };
-    sane.then(|| align([&Vector3::y(), &Vector3::x()], [&snap(up), &snap(left)]))
-}
-
-/// The frame in which trunk and legs are straightest and most upright.
-fn most_upright_frame(bvh: &Bvh, source: &Source, up: &Vector3<f64>) -> usize {
-    use Joint::*;
-    let bend = |frame: usize| {
-        let world = bvh.joint_frames(frame);
-        let mut sum = torso(source, &world).angle(up);
-        for (upper, lower) in [(LeftUpperLeg, LeftLowerLeg), (RightUpperLeg, RightLowerLeg)] {
-            let (hip, knee) = (source.position(upper, &world), source.position(lower, &world));
-            sum += (hip - knee).angle(up) + (knee - source.ankle(lower, bvh, &world)).angle(up);
-        }
-        sum
-    };
-    sampled(bvh).min_by(|a, b| bend(*a).total_cmp(&bend(*b))).unwrap_or(0)
 }
 
 /// Turns the target's trunk like the source's in one frame: same direction of the torso, same line of hips and
@@ -143,9 +64,9 @@ fn trunk_of_frame(source: &Source, target: &Skeleton, world: &[Isometry3<f64>], 
 }
 
 /// Hinge axes of elbows and knees in the frame of the upper bone's joint, by the upper joint: the mean of upper ×
-/// lower bone over the motion. `None` where the joint hardly bends.
+/// lower bone over the motion. `None` where the joint rarely bends.
 fn hinges(bvh: &Bvh, source: &Source) -> Vec<Option<Vector3<f64>>> {
-    const LEAST_BEND: f64 = 0.1; // mean sine of the angle between the bones
+    const MIN_BEND: f64 = 0.1; // mean sine of the angle between the bones
     use Joint::*;
     let mut out = vec![None; JOINT_COUNT];
     for (upper, lower) in [
@@ -164,7 +85,7 @@ fn hinges(bvh: &Bvh, source: &Source) -> Vec<Option<Vector3<f64>>> {
             sum += world[joint].rotation.inverse() * axis;
             count += 1.0;
         }
-        if sum.norm() > LEAST_BEND * count {
+        if sum.norm() > MIN_BEND * count {
             out[upper.index()] = Some(sum.normalize());
         }
     }
@@ -209,7 +130,7 @@ fn is_foot(joint: Joint) -> bool {
     matches!(joint, Joint::LeftFoot | Joint::RightFoot)
 }
 
-/// A foot is flat on the ground in both skeletons wherever their joints sit: only its heading is taken over.
+/// A foot is flat on the ground in both skeletons wherever their joints sit: only its heading is copied.
 fn heading(rest_bone: &Vector3<f64>, bone: &Vector3<f64>, trunk: &Trunk) -> UnitQuaternion<f64> {
     let upright = align([&Vector3::y(), &Vector3::x()], [&trunk.up, &(trunk.pelvis * Vector3::x())]);
     let level = |v: Vector3<f64>| v - trunk.up * trunk.up.dot(&v);
@@ -240,18 +161,6 @@ fn rest_hinge(target: &Skeleton, joint: Joint) -> Vector3<f64> {
     bone(target, joint).unwrap_or_else(Vector3::x).cross(&towards)
 }
 
-/// The direction of a limb's bone in the target's rest pose.
-pub(crate) fn bone(target: &Skeleton, joint: Joint) -> Option<Vector3<f64>> {
-    use Joint::*;
-    let child = match joint {
-        LeftHand => LeftMiddleProximal,
-        RightHand => RightMiddleProximal,
-        LeftShoulder | RightShoulder | LeftToes | RightToes => return None,
-        _ => toile_character::joint::JOINTS.into_iter().find(|c| c.parent() == Some(joint))?,
-    };
-    Some(target.position(child) - target.position(joint))
-}
-
 /// Constants from the world rotations of both skeletons in the reference.
 fn calibrated(
     source: &Source,
@@ -260,11 +169,11 @@ fn calibrated(
     turned: &[UnitQuaternion<f64>],
     up: Vector3<f64>,
     from_rest: bool,
-) -> Reference {
+) -> Constants {
     let between = |joint: usize, turned: &UnitQuaternion<f64>| world[joint].rotation.inverse() * turned;
     let count = source.spine.len() as f64;
     let spine = |k: usize| trunk.pelvis.slerp(&trunk.chest, (k + 1) as f64 / count);
-    Reference {
+    Constants {
         up,
         from_rest,
         pelvis: between(source.pelvis, &trunk.pelvis),

@@ -3,7 +3,7 @@
 use toile_character::Motion;
 
 /// Frame times in files are rounded (0.0333 s for 30 Hz): rates that differ by less than this share are the same,
-/// and a last pose that is missed by less than this share of a step is taken.
+/// and a last pose that is missed by less than this share of a step is included.
 const ROUNDING: f64 = 5e-3;
 
 /// The motion with at most `max_rate` poses a second; a slower one is returned as it is.

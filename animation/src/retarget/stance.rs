@@ -1,23 +1,23 @@
-//! How a foot stands flat, read off the motion where the zero pose does not show it.
+//! The turn of a foot that stands flat, from the motion where the zero pose does not show it.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use toile_character::{Joint, Skeleton};
 use toile_geometry::direction::{align, swing};
 
-use crate::{
-    bvh::Bvh,
-    reference::{Reference, bone, sampled},
-    source::Source,
+use super::{
+    constants::{Constants, bone},
+    moments::sampled,
 };
+use crate::{Bvh, skeleton::Source};
 
 /// Share of the frames, those with the lowest ankle and toe, that count as standing.
 const STANDING_SHARE: f64 = 0.3;
 
 /// Sets the constants of `foot` and its toes so that the target's foot is flat where the source's stands: of the
-/// frames with the foot lowest, the one with the median pitch is taken as flat, whatever the joints' heights.
-pub(crate) fn calibrate_foot(bvh: &Bvh, source: &Source, target: &Skeleton, foot: Joint, reference: &mut Reference) {
+/// frames with the foot lowest, the one with the median pitch counts as flat, whatever the joints' heights.
+pub(super) fn calibrate_foot(bvh: &Bvh, source: &Source, target: &Skeleton, foot: Joint, constants: &mut Constants) {
     let (Some(joint), Some(rest_bone)) = (source.limb(foot), bone(target, foot)) else { return };
-    let up = reference.up;
+    let up = constants.up;
     let mut frames: Vec<(f64, f64, usize)> = Vec::new();
     for frame in sampled(bvh) {
         let world = bvh.joint_frames(frame);
@@ -33,10 +33,10 @@ pub(crate) fn calibrate_foot(bvh: &Bvh, source: &Source, target: &Skeleton, foot
     let world = bvh.joint_frames(lowest[standing / 2].2);
     let Some(tip) = source.tip(foot, bvh, &world) else { return };
     let flat = flat_foot(&rest_bone, &(tip - source.position(foot, &world)), &up);
-    reference.limbs[foot.index()] = world[joint].rotation.inverse() * flat;
+    constants.limbs[foot.index()] = world[joint].rotation.inverse() * flat;
     let toes = if foot == Joint::LeftFoot { Joint::LeftToes } else { Joint::RightToes };
     if let Some(joint) = source.limb(toes) {
-        reference.limbs[toes.index()] = world[joint].rotation.inverse() * flat;
+        constants.limbs[toes.index()] = world[joint].rotation.inverse() * flat;
     }
 }
 
