@@ -3,15 +3,15 @@
 //!     cargo run --release -p toile-garments --example stack_layers -- BUILD OUT [MOTION.bvh ...]
 //!
 //! BUILD is a subject's build folder with `body/` and each layer's `unstacked.ply`. OUT gets the body and the garments
-//! in the same layout. With motions each is tried on the stacked layers, all frames, by their skin weights alone:
-//! crossings between layers, and stretch.
+//! in the same layout. Each motion is tried on the stacked layers, in all frames, by their skin weights alone; crossings
+//! between layers and stretch are printed.
 #![allow(clippy::print_stdout)] // a developer's tool
 
 use std::{error::Error, path::Path, time::Instant};
 
 use toile_animation::{RetargetSettings, bvh, retarget};
 use toile_character::{BodyModel, Pose, Skeleton, SkinWeights};
-use toile_garments::{GarmentType, StackSettings, Worn, carry_weights, posed_report, stack};
+use toile_garments::{GarmentType, StackSettings, Worn, carry_weights, cloth_thickness, posed_report, stack};
 use toile_geometry::{Mesh, ply};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The thickness of a layer by its name.
 fn thickness(name: &str) -> f32 {
     let kind = name.split_once('-').map_or(name, |n| n.1);
-    kind.parse().unwrap_or(GarmentType::Other).thickness()
+    cloth_thickness(kind.parse().unwrap_or(GarmentType::Other))
 }
 
 fn walk(

@@ -1,4 +1,6 @@
-//! What can go wrong while a garment is taken out of a scan.
+//! What can go wrong while a garment is extracted from a scan.
+
+use toile_character::GarmentType;
 
 /// Errors of the garments crate. A take that shows no garment is a result with a warning, not an error.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -15,4 +17,10 @@ pub enum GarmentError {
     /// Edits that cannot be used.
     #[error("{0}")]
     Edits(String),
+    /// Labels by the nearest body vertex need a template, and this type of garment has none.
+    #[error(
+        "garments of type {0} have no template for labels by the nearest body vertex: give the layer a type (top, \
+         trousers, skirt, dress or jacket) in subject.toml, or set labelling = \"graph-cut\""
+    )]
+    NoTemplate(GarmentType),
 }

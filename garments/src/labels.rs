@@ -1,141 +1,90 @@
-//! New garment or not: one energy over the scan's surface, minimised globally by a graph cut.
+//! New garment or not: the label of every scan vertex.
 //!
-//! E(l) = Σ_v area_v · odds_v(l_v) + λ Σ_e dual_e · edge_e · [l_i ≠ l_j]; the odds join height, colour, the type's
-//! template and the colours that an earlier round found (Rother et al. 2004, GrabCut, on a surface).
+//! Each step is a function from labels to labels and leaves a [`Reason`](types::Reason) where it had the last word. The
+//! first labels come from one energy ([`energy`]) over evidence, place on the body and colours ([`odds`]), or from the
+//! nearest body vertex as in the seed ([`nearest_body`]). Patches that cloth worn before swung into or that were
+//! uncovered are not new ([`swung`], [`uncovered`]); islands and patches that nobody saw are settled by their
+//! surroundings ([`islands`], [`closed_patches`]).
 
-use toile_geometry::max_flow::GraphCut;
+pub(crate) mod closed_patches;
+pub(crate) mod energy;
+pub(crate) mod guess;
+pub(crate) mod islands;
+mod nearest_body;
+pub(crate) mod odds;
+mod swung;
+pub mod template;
+pub mod types;
+mod uncovered;
 
-use crate::{ExtractSettings, GarmentType, color, color::Histogram, evidence::Evidence, scan_graph::ScanGraph};
+use toile_character::GarmentType;
 
-/// Capacities are integers: one unit is this many square metres times nats.
-const UNIT: f32 = 1e-9;
-/// Hem along the strongest edge still costs this share.
-const LEAST_EDGE: f32 = 0.12;
-/// Where nothing was seen, evidence counts this much.
-const FILLED_TRUST: f32 = 0.2;
-/// What the colour model of an earlier round may say at most, nats.
-const COLOR_MODEL_LIMIT: f32 = 2.0;
+use self::{
+    energy::Energy,
+    nearest_body::label_by_nearest_body_vertex,
+    odds::log_odds,
+    swung::drop_swung,
+    types::{Labels, Reason},
+    uncovered::drop_uncovered,
+};
+use crate::{
+    error::GarmentError,
+    measure::Measured,
+    settings::{ExtractSettings, Labelling},
+};
 
-/// The answer for each scan vertex.
-#[derive(Debug, Clone, Default)]
-pub struct Labels {
-    /// True where the new garment is.
-    pub garment: Vec<bool>,
-    /// How sure the label is, 0.5 to 1.
-    pub confidence: Vec<f32>,
-    /// Log odds that the last round used, before smoothing.
-    pub log_odds: Vec<f32>,
+/// First labels of a take.
+pub(crate) struct Labelled {
+    /// The known or guessed type.
+    pub garment_type: GarmentType,
+    pub labels: Labels,
+    /// Area that looked new and was only uncovered, square metres.
+    pub uncovered_m2: f32,
 }
 
-/// Labels a scan. `initial` holds the labels of an earlier call, whose colours are used from the first round on.
-pub fn label(
-    graph: &ScanGraph,
-    evidence: &Evidence,
+/// Labels a take by the way that the settings choose.
+pub(crate) fn label(on: &Measured, settings: &ExtractSettings) -> Result<Labelled, GarmentError> {
+    let mut found = match on.take.garment_type {
+        Some(known) => label_by_evidence(on, known, None, settings),
+        None => label_and_guess(on, settings),
+    };
+    if settings.labelling == Labelling::NearestBodyVertex {
+        found.labels = label_by_nearest_body_vertex(on, found.garment_type)?;
+    }
+    Ok(found)
+}
+
+/// Labels without a template first, then with that of the type that these labels look like.
+fn label_and_guess(on: &Measured, settings: &ExtractSettings) -> Labelled {
+    let free = label_by_evidence(on, GarmentType::Other, None, settings);
+    match guess::guess_type(on, &free.labels) {
+        GarmentType::Other => free,
+        guess => {
+            let found = label_by_evidence(on, guess, Some(&free.labels), settings);
+            Labelled { uncovered_m2: found.uncovered_m2.max(free.uncovered_m2), ..found }
+        }
+    }
+}
+
+/// Labels a take as a garment of a type. The colours of `earlier` labels are used from the first round on.
+fn label_by_evidence(
+    on: &Measured,
     garment_type: GarmentType,
-    initial: Option<&Labels>,
+    earlier: Option<&Labels>,
     settings: &ExtractSettings,
-) -> Labels {
-    let edge_costs = edge_costs(graph, evidence, settings.smoothness);
-    let mut labels = initial.cloned();
-    for _ in 0..settings.rounds.max(1) {
-        let odds = odds(graph, evidence, garment_type, labels.as_ref());
-        let garment = cut(graph, &odds, &edge_costs);
-        let settled = labels.as_ref().is_some_and(|l| l.garment == garment);
-        let confidence = confidence(graph, &odds, &garment);
-        labels = Some(Labels { garment, confidence, log_odds: odds });
+) -> Labelled {
+    let energy = Energy::new(on, settings);
+    let mut labels = energy.minimise(log_odds(on, garment_type, earlier), &[]);
+    let mut settled = earlier.is_some_and(|before| before.garment == labels.garment);
+    for _ in 1..settings.rounds.max(1) {
         if settled {
             break;
         }
+        let next = energy.minimise(log_odds(on, garment_type, Some(&labels)), &[]);
+        settled = next.garment == labels.garment;
+        labels = next;
     }
-    labels.unwrap_or_default()
-}
-
-/// Labels once more after the log odds were changed in places.
-pub fn relabel(graph: &ScanGraph, evidence: &Evidence, labels: &mut Labels, settings: &ExtractSettings) {
-    let edge_costs = edge_costs(graph, evidence, settings.smoothness);
-    labels.garment = cut(graph, &labels.log_odds, &edge_costs);
-    labels.confidence = confidence(graph, &labels.log_odds, &labels.garment);
-}
-
-fn odds(graph: &ScanGraph, evidence: &Evidence, garment_type: GarmentType, earlier: Option<&Labels>) -> Vec<f32> {
-    let prior = garment_type.prior();
-    let colors = earlier.map(|l| color_model(graph, l)).unwrap_or_else(|| vec![0.0; graph.len()]);
-    (0..graph.len())
-        .map(|v| {
-            let place: f32 = evidence.parts[v].iter().zip(&prior).map(|(share, p)| share * p).sum();
-            let trust = if graph.filled[v] > 0.5 { FILLED_TRUST } else { 1.0 };
-            (trust * (evidence.log_odds(v) + colors[v]) + place).clamp(-7.0, 7.0)
-        })
-        .collect()
-}
-
-/// Log odds from the colours of garment and rest in `labels`, where the labels are sure.
-pub fn color_model(graph: &ScanGraph, labels: &Labels) -> Vec<f32> {
-    if graph.lab.is_empty() {
-        return vec![0.0; graph.len()];
-    }
-    let (mut new, mut old) = (Histogram::default(), Histogram::default());
-    for v in (0..graph.len()).filter(|&v| graph.filled[v] < 0.5) {
-        let side = if labels.garment[v] { &mut new } else { &mut old };
-        side.add(&graph.lab[v], graph.areas[v] * labels.confidence[v]);
-    }
-    let limit = COLOR_MODEL_LIMIT;
-    graph.lab.iter().map(|c| (new.density(c) / old.density(c)).ln().clamp(-limit, limit)).collect()
-}
-
-/// Cost of cutting each edge: its dual length, less where colour or height jumps.
-fn edge_costs(graph: &ScanGraph, evidence: &Evidence, smoothness: f32) -> Vec<f32> {
-    let jump = |e: usize| {
-        let [i, j] = graph.edges[e].map(|v| v as usize);
-        let color = if graph.lab.is_empty() { 0.0 } else { color::difference(&graph.lab[i], &graph.lab[j]).powi(2) };
-        let (hi, hj) = (evidence.height[i], evidence.height[j]);
-        let height = if hi.is_finite() && hj.is_finite() { (hi - hj).powi(2) } else { 0.0 };
-        (color, height)
-    };
-    let count = graph.edges.len().max(1) as f64;
-    let (mut mean_color, mut mean_height) = (0.0f64, 0.0f64);
-    for e in 0..graph.edges.len() {
-        let (c, h) = jump(e);
-        mean_color += f64::from(c) / count;
-        mean_height += f64::from(h) / count;
-    }
-    let color_scale = 1.0 / (4.0 * mean_color as f32).max(1e-6);
-    let height_scale = 1.0 / (4.0 * (mean_height as f32).max(evidence.height_noise.powi(2)));
-    (0..graph.edges.len())
-        .map(|e| {
-            let (c, h) = jump(e);
-            let edge = (-(c * color_scale + h * height_scale)).exp();
-            smoothness * graph.dual_lengths[e] * (LEAST_EDGE + (1.0 - LEAST_EDGE) * edge)
-        })
-        .collect()
-}
-
-fn cut(graph: &ScanGraph, odds: &[f32], edge_costs: &[f32]) -> Vec<bool> {
-    let units = |x: f32| (x / UNIT).round() as i64;
-    let mut cut = GraphCut::new(graph.len(), graph.edges.len());
-    for (v, &o) in odds.iter().enumerate() {
-        let cost = units(o * graph.areas[v]);
-        cut.add_terminal(v as u32, cost.max(0), (-cost).max(0));
-    }
-    for (&[a, b], &cost) in graph.edges.iter().zip(edge_costs) {
-        let cost = units(cost);
-        cut.add_edge(a, b, cost, cost);
-    }
-    cut.solve();
-    (0..graph.len() as u32).map(|v| cut.is_source(v)).collect()
-}
-
-/// Probability of each label from the log odds averaged over the neighbourhood.
-fn confidence(graph: &ScanGraph, odds: &[f32], garment: &[bool]) -> Vec<f32> {
-    let mut mean = odds.to_vec();
-    for _ in 0..3 {
-        mean = (0..mean.len())
-            .map(|v| {
-                let around = graph.neighbors.of(v);
-                let sum: f32 = around.iter().map(|&n| mean[n as usize]).sum();
-                (mean[v] + sum) / (1.0 + around.len() as f32)
-            })
-            .collect();
-    }
-    mean.iter().zip(garment).map(|(&m, &g)| (1.0 / (1.0 + (if g { -m } else { m }).exp())).max(0.5)).collect()
+    let labels = drop_uncovered(labels, on);
+    let uncovered_m2 = labels.area_of(Reason::Uncovered, &on.graph.areas);
+    Labelled { garment_type, labels: drop_swung(labels, on), uncovered_m2 }
 }

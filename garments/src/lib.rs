@@ -1,72 +1,63 @@
 //! The next garment layer from the next scan: labels, cut, un-pose, stack without penetration.
 //!
-//! Input of one take: the new scan, what was worn before (posed into it), and the body (posed into it). The way:
+//! Input of one take: the new scan, the surface that was worn before (posed into it), and the body (posed into it).
+//! [`extract()`] runs these steps:
 //!
-//! 1. [`evidence`]: how far each scan vertex stands off what was worn before, how its colour differs, and where on
-//!    the body it lies;
-//! 2. [`labels`]: new garment or not, one energy over the scan's surface, minimised globally by a graph cut;
-//!    What only swung, or was uncovered, is not ([`not_new`]);
-//! 3. [`hem`], [`cut`], [`clean`] and [`rim`]: the garment's own mesh, cut through triangles along a smooth hem, islands dropped, holes
-//!    closed;
-//! 4. [`common_frame`]: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3);
-//! 5. [`mod@stack`]: every layer outside all layers below it (seed eq. 7 and better), verified with exact tests;
-//! 6. [`mod@limit_stretch`] and [`layer_weights`]: cloth that no stride tears, and layers close over one another move
-//!    alike; [`posed`] tells what they do in other poses;
-//! 7. [`hidden`]: what of the body and of lower layers is never in sight, for exports that leave it out.
+//! 1. `measure`: how far each scan vertex stands off what was worn before, how its colour differs, and where on the body
+//!    it lies;
+//! 2. `labels`: new garment or not, one energy over the scan's surface, minimised globally by a graph cut; cloth that only
+//!    swung, or was uncovered, is not new; `hem` moves the border half-way up the step at each hem;
+//! 3. `edits`: corrections by hand, applied to the labels each time;
+//! 4. `mesh`: the garment's own mesh, cut through triangles along a smooth hem, islands dropped, holes closed;
+//! 5. `skin`: weights from the body, un-posed into the body's pose (Hu et al. 2017, §6.3).
 //!
-//! [`edits`] are corrections by hand, applied to the labels each time.
+//! [`stack()`] then puts every layer outside all layers below it (seed eq. 7 and better), verified with exact tests, and
+//! [`carry_weights`] gives layers that lie close over one another like weights, and none that a stride tears. `worn` examines
+//! the result: [`posed_report`] poses the layers, [`hidden_triangles`] finds triangles that are never in sight.
 //!
-//! [`extract`](extract::extract) runs 1 to 4 for one take; [`stack`](stack::stack) runs 5 and
-//! [`carry_weights`] 6 over all layers.
+//! The seed's own way stays selectable: [`Labelling::NearestBodyVertex`] and [`StackMethod::PushAlongNormal`].
 //!
 //! ```
-//! use toile_garments::GarmentType;
+//! use toile_garments::{ExtractSettings, GarmentType, Labelling};
 //! assert_eq!("trousers".parse(), Ok(GarmentType::Trousers));
+//! assert_eq!(ExtractSettings::default().labelling, Labelling::GraphCut);
 //! ```
 
-pub mod body_parts;
-pub mod clean;
-pub mod color;
-pub mod common_frame;
-pub mod contacts;
-pub mod cut;
-pub mod cut_rest;
-pub mod edits;
-pub mod error;
-pub mod evidence;
-pub mod extract;
-pub mod fair;
-mod garment_mesh;
-pub mod garment_type;
-mod guess;
-pub mod hanging;
-pub mod hem;
-pub mod hidden;
-pub mod labels;
-pub mod layer_weights;
-pub mod limit_stretch;
-pub mod not_new;
-pub mod pile;
-pub mod posed;
-pub mod push;
-pub mod region;
-pub mod rim;
-pub mod scan_graph;
-pub mod settings;
-pub mod stack;
-pub mod stack_report;
-pub mod surface_solve;
-pub mod untangle;
-pub mod worn_surface;
+mod edits;
+mod error;
+mod extract;
+mod hem;
+mod labels;
+mod measure;
+mod mesh;
+mod report;
+mod settings;
+mod skin;
+mod stack;
+mod take;
+mod worn;
 
-pub use edits::Edits;
+pub use edits::{
+    GROWTH,
+    applied::WithoutEffect,
+    format::{EditName, Edits, HemLine, Mark, Stroke, VERSION as EDITS_VERSION},
+};
 pub use error::GarmentError;
-pub use extract::{Extraction, Take, Warning, extract};
-pub use garment_type::GarmentType;
-pub use hidden::hidden_triangles;
-pub use layer_weights::carry_weights;
-pub use limit_stretch::limit_stretch;
-pub use posed::{PosedReport, Worn, posed_report};
-pub use settings::{CullSettings, ExtractSettings, StackSettings};
-pub use stack::stack;
-pub use stack_report::{GAP_BINS_MM, LayerReport, StackReport};
+pub use extract::{Extraction, extract};
+pub use labels::{
+    template::cloth_thickness,
+    types::{Labels, Reason},
+};
+pub use report::{ExtractionReport, Warning};
+pub use settings::{CullSettings, ExtractSettings, Labelling, StackMethod, StackSettings};
+pub use skin::{common_frame::weights as weights_from_body, hanging::mark_free, layer_weights::carry_weights};
+pub use stack::{
+    report::{GAP_BINS_MM, LayerReport, StackReport},
+    stack,
+};
+pub use take::Take;
+pub use toile_character::{FREE_PART, GarmentType};
+pub use worn::{
+    hidden::hidden_triangles,
+    posed::{PosedReport, TORN, Worn, posed_report},
+};

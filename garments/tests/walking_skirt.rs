@@ -6,13 +6,15 @@ use std::path::PathBuf;
 
 use toile_animation::{RetargetSettings, bvh, retarget, shipped_walk};
 use toile_character::Pose;
-use toile_garments::{ExtractSettings, Take, Worn, carry_weights, common_frame, hanging, posed_report};
+use toile_garments::{
+    ExtractSettings, FREE_PART, Take, Worn, carry_weights, mark_free, posed_report, weights_from_body,
+};
 use toile_geometry::{Mesh, remesh};
 use toile_synthetic::{GarmentKind, GarmentSettings, Subject, SyntheticSettings};
 
-/// Every so many frames of a motion are looked at.
+/// One of this many frames of a motion is looked at.
 const STRIDE: usize = 6;
-/// No triangle may be stretched more.
+/// Limit of the stretch of any triangle.
 const MOST_STRETCH: f32 = 3.0;
 
 fn dressed(seed: u64) -> Subject {
@@ -24,9 +26,9 @@ fn dressed(seed: u64) -> Subject {
 /// 0.01 mm. Marked where it hangs free.
 fn skirt_of(subject: &Subject) -> Mesh {
     let mut skirt = remesh::isotropic(&subject.garments[0].worn.mesh, ExtractSettings::default().edge_length);
-    let free = hanging::mark_free(&subject.person.body.mesh, &skirt);
+    let free = mark_free(&subject.person.body.mesh, &skirt);
     free_below(&skirt, &free);
-    skirt.attributes.insert(hanging::FREE_PART.into(), free);
+    skirt.attributes.insert(FREE_PART.into(), free);
     skirt
 }
 
@@ -56,14 +58,14 @@ fn a_skirt_is_not_torn_between_the_legs() {
             garment_type: None,
             edits: None,
         };
-        let mut weights = [common_frame::weights(&take, skirt, &ExtractSettings::default())];
+        let mut weights = [weights_from_body(&take, skirt, &ExtractSettings::default())];
         let given = weights[0].clone();
         carry_weights(std::slice::from_ref(skirt), &mut weights, &body.skeleton, &rest).unwrap();
         let poses =
             |motion| retarget(motion, "walk", &body.skeleton, &RetargetSettings::default()).unwrap().motion.poses;
         let poses: Vec<Pose> = motions().iter().flat_map(|motion| poses(motion).into_iter().step_by(STRIDE)).collect();
         let report = |weights| posed_report(&[Worn { mesh: skirt, weights }], &body.skeleton, &rest, &poses).remove(0);
-        assert!(report(&given).torn_most > 0, "seed {seed}: a crumple tears no more: {:?}", report(&given));
+        assert!(report(&given).torn_most > 0, "seed {seed}: a crumple does not tear any more: {:?}", report(&given));
         let report = report(&weights[0]);
         assert!(poses.len() >= 5 && report.stretch_most < MOST_STRETCH, "seed {seed}: {report:?}");
         assert!(report.stretch_most > 1.02, "the skirt does not move: {report:?}");

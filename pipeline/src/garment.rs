@@ -1,6 +1,6 @@
 //! What is known of a garment: its type and how thick its cloth is.
 
-use toile_garments::GarmentType;
+use toile_garments::{GarmentType, cloth_thickness};
 
 use crate::{PipelineError, Run, body_file::read_json};
 
@@ -22,7 +22,7 @@ pub fn garment_type(run: &Run, n: usize) -> Option<GarmentType> {
 /// [`PipelineError`] where `subject.toml` tells no thickness of cloth.
 pub fn thickness(run: &Run, n: usize) -> Result<f32, PipelineError> {
     let told = told_thickness(run, n)?;
-    Ok(told.unwrap_or_else(|| garment_type(run, n).unwrap_or(GarmentType::Other).thickness()))
+    Ok(told.unwrap_or_else(|| cloth_thickness(garment_type(run, n).unwrap_or(GarmentType::Other))))
 }
 
 /// What `subject.toml` says of the thickness of the cloth of take `n`'s garment, metres.

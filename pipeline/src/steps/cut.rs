@@ -78,13 +78,10 @@ pub fn run(run: &Run, n: usize, worn_as: usize, body: &Body) -> Result<Record, P
 /// Reads and checks a layer's edits.
 ///
 /// # Errors
-/// [`PipelineError::Format`] where the file is no edits, and why.
+/// [`PipelineError::Format`] where the file is not a valid edits file, and why.
 pub fn read_edits(path: &Path) -> Result<Edits, PipelineError> {
     let bytes = std::fs::read(path).map_err(|e| PipelineError::io(path, e))?;
-    let edits: Edits =
-        serde_json::from_slice(&bytes).map_err(|e| PipelineError::format(path, format!("no edits: {e}")))?;
-    edits.check().map_err(|e| PipelineError::format(path, e))?;
-    Ok(edits)
+    Edits::from_json(&bytes).map_err(|e| PipelineError::format(path, e))
 }
 
 fn product(run: &Run, layer: &str, found: &Extraction) -> Result<Product, PipelineError> {

@@ -6,7 +6,7 @@
 use serde_json::json;
 use toile_character::{Pose, SkinWeights};
 use toile_garments::{
-    LayerReport, PosedReport, StackSettings, Worn, carry_weights, hanging::FREE_PART, posed::TORN, posed_report, stack,
+    FREE_PART, LayerReport, PosedReport, StackSettings, TORN, Worn, carry_weights, posed_report, stack,
 };
 use toile_geometry::{Mesh, ply};
 

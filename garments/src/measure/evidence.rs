@@ -1,0 +1,108 @@
+//! The evidence at each scan vertex for being new: its height over what was worn before, its colour, its place.
+
+use rayon::prelude::*;
+
+use super::{before::Before, body_parts::PART_COUNT, noise::noise, on_body::on_body, scan_graph::ScanGraph};
+use crate::{settings::ExtractSettings, take::Take};
+
+/// Cloth worn before lies differently in each take, by this share of its distance from the body.
+const SLIP_SHARE: f32 = 0.2;
+/// Half of the cloth at this distance from the body does so, metres.
+const SLIPS: f32 = 0.03;
+/// Scale of the exponential heights of new cloth over the surface below, metres: near hems it is low, skirts reach far.
+const CLOTH_HEIGHT: f32 = 0.06;
+/// What the density of cloth heights is divided by, metres: most cloth lies within this.
+const CLOTH_SPREAD: f32 = 0.017;
+/// How far new cloth presses in the surface below, metres.
+const CLOTH_PRESS: f32 = 0.002;
+/// Extent of colour differences between different cloths.
+const COLOR_RANGE: f32 = 60.0;
+/// Log odds where no earlier surface is within reach, nats.
+const OUT_OF_REACH: f32 = 3.0;
+/// Neither height nor colour decides by more than this, nats.
+const LIMIT: f32 = 4.0;
+
+/// What was measured at each scan vertex.
+#[derive(Debug, Clone)]
+pub struct Evidence {
+    /// Signed height over the earlier surface, metres; infinite where none is within reach.
+    pub height: Vec<f32>,
+    /// Distance from the earlier surface whichever way it faces, metres; infinite where none is within reach.
+    pub clearance: Vec<f32>,
+    /// Colour difference from the nearest place of the earlier surface; NaN where either was not seen.
+    pub color: Vec<f32>,
+    /// Cosine between the scan's normal and the earlier surface's: small where a hem's edge drops to the surface below.
+    pub facing: Vec<f32>,
+    /// Shares of the body parts at the closest point of the body.
+    pub parts: Vec<[f32; PART_COUNT]>,
+    /// Distance from the body, metres.
+    pub body_distance: Vec<f32>,
+    /// Cosine between the scan's normal and the body's at the closest place.
+    pub body_facing: Vec<f32>,
+    /// Laplacian scale of `height` on uncovered parts, metres.
+    pub height_noise: f32,
+    /// Exponential scale of `color` on uncovered parts.
+    pub color_noise: f32,
+}
+
+/// Measures a take.
+pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Evidence {
+    let on_body = on_body(take, graph);
+    let before = Before::new(take.previous);
+    let compare = |v| before.compare(&take.scan.positions[v], &graph.normals[v], graph.lab.get(v), settings);
+    let compared: Vec<_> = (0..graph.len()).into_par_iter().map(compare).collect();
+    let seen_color = |(v, filled): (usize, &f32)| if *filled > 0.5 { f32::NAN } else { compared[v].color };
+    let height: Vec<f32> = compared.iter().map(|c| c.height).collect();
+    let color: Vec<f32> = graph.filled.iter().enumerate().map(seen_color).collect();
+    let parts: Vec<_> = on_body.iter().map(|b| b.parts).collect();
+    let [height_noise, color_noise] = noise(&parts, &height, &color);
+    Evidence {
+        height,
+        clearance: compared.iter().map(|c| c.clearance).collect(),
+        color,
+        facing: compared.iter().map(|c| c.facing).collect(),
+        parts,
+        body_distance: on_body.iter().map(|b| b.distance).collect(),
+        body_facing: on_body.iter().map(|b| b.facing).collect(),
+        height_noise,
+        color_noise,
+    }
+}
+
+impl Evidence {
+    /// Natural log odds of "new" against "old" at vertex `v`, from height and colour.
+    pub fn log_odds(&self, v: usize) -> f32 {
+        self.height_log_odds(self.height[v], self.body_distance[v] - self.height[v])
+            + self.color_log_odds(self.color[v])
+    }
+
+    /// Uncovered skin is a Laplacian around zero with rare outliers; earlier cloth, `slack` metres off the body, is one
+    /// with a second, wider part; the height of new cloth over either is exponential.
+    fn height_log_odds(&self, height: f32, slack: f32) -> f32 {
+        if !height.is_finite() {
+            return OUT_OF_REACH;
+        }
+        let b = self.height_noise;
+        let laplacian = |scale: f32| (-height.abs() / scale).exp() / (2.0 * scale);
+        let slack = slack.max(0.0);
+        let slipped = slack / (slack + SLIPS);
+        let lies = (1.0 - slipped) * laplacian(b) + slipped * laplacian(b.max(SLIP_SHARE * slack));
+        let old = 0.97 * lies + 0.03 / 0.06;
+        let press = b.max(CLOTH_PRESS);
+        let shape = if height >= 0.0 { (-height / CLOTH_HEIGHT).exp() } else { (height / press).exp() };
+        let new = shape / CLOTH_SPREAD;
+        (new.max(1e-4) / old).ln().clamp(-LIMIT, LIMIT)
+    }
+
+    /// The same cloth differs by an exponential amount; another cloth by any amount, and sometimes not at all.
+    fn color_log_odds(&self, difference: f32) -> f32 {
+        if difference.is_nan() {
+            return 0.0;
+        }
+        let b = self.color_noise;
+        let same = (-difference / b).exp() / b;
+        let any = 1.0 / COLOR_RANGE;
+        let (old, new) = (0.97 * same + 0.03 * any, 0.3 * same + 0.7 * any);
+        (new / old).ln().clamp(-LIMIT, LIMIT)
+    }
+}

@@ -1,0 +1,10 @@
+//! Garments on a synthetic person: a column of cloth-covered rings with known truth.
+
+#![allow(clippy::unwrap_used)] // all of it is test code
+
+mod column;
+mod edits;
+mod extraction;
+mod hard_cases;
+mod seed;
+mod stacking;
