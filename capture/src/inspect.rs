@@ -8,7 +8,7 @@ use std::{
 use serde::Serialize;
 
 use crate::{
-    CaptureError, Frame, GarmentType, Loss, Replay, Rig, Source, Subject,
+    CaptureError, Frame, Loss, Replay, Rig, Source, Subject,
     import::{self, Format, record::number_list},
 };
 
@@ -47,7 +47,7 @@ pub struct TakeInspection {
     /// Layer label such as `01-trousers`, or the file's name.
     pub name: String,
     /// What garment it shows, where that is known.
-    pub garment: Option<GarmentType>,
+    pub garment: Option<String>,
     /// `mcap`, or the layout of a folder.
     pub format: String,
     /// Size of the recording, bytes; 0 for folders.
@@ -139,7 +139,7 @@ fn inspect_layers(subject: &Subject) -> Vec<TakeInspection> {
             ..TakeInspection::default()
         });
         take.name = layer.label();
-        take.garment = layer.garment;
+        take.garment = layer.garment.clone();
         take
     };
     subject.layers().iter().map(inspect_layer).collect()
@@ -295,7 +295,7 @@ impl fmt::Display for Inspection {
 }
 
 fn write_take(text: &mut String, take: &TakeInspection) -> fmt::Result {
-    let garment = take.garment.map_or_else(String::new, |garment| format!(" ({garment})"));
+    let garment = take.garment.as_ref().map_or_else(String::new, |garment| format!(" ({garment})"));
     let size = if take.bytes > 0 { format!(", {:.1} MB", take.bytes as f64 * 1e-6) } else { String::new() };
     writeln!(
         text,

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use toile_capture::LockedSubject;
+use toile_capture::{LockedSubject, subject::Layer};
 use toile_garments::GarmentType;
 use toile_geometry::{Mesh, obj, ply};
 
@@ -33,6 +33,7 @@ impl<'a> Run<'a> {
     /// [`PipelineError`] where there is no subject, it has no such layer, or another run works on it.
     pub fn open(root: &Path, last: Option<&str>, observer: &'a dyn Observer) -> Result<Self, PipelineError> {
         let subject = LockedSubject::open(root)?;
+        check_types(root, subject.layers())?;
         let mut layers: Vec<String> = subject.layers().iter().map(|l| l.label()).collect();
         if layers.is_empty() {
             let reason =
@@ -106,8 +107,9 @@ impl<'a> Run<'a> {
 
     /// The type of the garment that take `n` added, where it is known.
     pub fn garment_type(&self, n: usize) -> Option<GarmentType> {
-        let layer = self.subject.as_ref()?.layers().get(n)?;
-        layer.garment?.name().parse().ok()
+        let layer = self.subject.as_ref()?.layers().get(n).filter(|_| n > 0)?;
+        let by_name = || toile_character::GarmentType::from_layer_name(&layer.name).map(|garment| garment.name());
+        layer.garment.as_deref().or_else(by_name)?.parse().ok()
     }
 
     /// Thickness of the cloth of the garment that take `n` added, millimetres, where it is told.
@@ -128,4 +130,16 @@ impl<'a> Run<'a> {
         let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
         Ok(if is_obj { obj::read(path)? } else { ply::read(path)? })
     }
+}
+
+/// Checks the types of all garments, so that a wrong one is found before any work is done.
+fn check_types(root: &Path, layers: &[Layer]) -> Result<(), PipelineError> {
+    for layer in layers {
+        let parsed =
+            layer.garment.as_deref().map_or(Ok(()), |text| text.parse::<toile_character::GarmentType>().map(drop));
+        parsed.map_err(|reason| {
+            PipelineError::format(&root.join("subject.toml"), format!("layer {}: {reason}", layer.label()))
+        })?;
+    }
+    Ok(())
 }

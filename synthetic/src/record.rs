@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use toile_capture::{GarmentType, Recorder, RecorderOptions, RecordingSummary, subject::BODY};
+use toile_capture::{Recorder, RecorderOptions, RecordingSummary, subject::BODY};
+use toile_character::GarmentType;
 
 use crate::{SyntheticError, subject::Subject, take::Take};
 
@@ -21,7 +22,8 @@ pub fn record_subject(
         let take = subject.take(n)?;
         let kind = n.checked_sub(1).map(|g| subject.garments[g].kind);
         let name = kind.map_or(BODY, |k| k.name());
-        let pending = entry.next_take(name, kind.and_then(|k| GarmentType::from_layer_name(k.name())))?;
+        let garment = kind.and_then(|k| GarmentType::from_layer_name(k.name()));
+        let pending = entry.next_take(name, garment.map(GarmentType::name))?;
         let share = 1.0 / subject.take_count() as f32;
         let options = RecorderOptions { replace_part: true, ..RecorderOptions::default() };
         summaries.push(record_take(&take, &pending.path, options, &|p| progress((n as f32 + p) * share))?);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{GarmentType, printable};
+use crate::printable;
 
 /// Name of the layer of take 0.
 pub const BODY: &str = "body";
@@ -15,9 +15,10 @@ pub struct Layer {
     pub number: usize,
     /// Name without the number: `body`, `trousers`.
     pub name: String,
-    /// What garment it is; `None` for the body, or where nobody said and the name does not show it.
+    /// Type of the garment, as text (`GarmentType` of the character crate names them); `None` for the body, or where nobody
+    /// said.
     #[serde(rename = "type", default, skip_serializing_if = "Option::is_none")]
-    pub garment: Option<GarmentType>,
+    pub garment: Option<String>,
     /// How thick the garment's cloth is, millimetres; `None` where nobody said: then its type decides.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thickness_mm: Option<f32>,
@@ -27,10 +28,9 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// Layer `number` called `name`. Where `garment` is `None`, the name may show it (`jeans` are trousers); the body
-    /// is never a garment.
-    pub(super) fn new(number: usize, name: &str, garment: Option<GarmentType>) -> Self {
-        let garment = garment.or_else(|| GarmentType::from_layer_name(name)).filter(|_| number > 0);
+    /// Layer `number` called `name`, of type `garment`; the body is never a garment.
+    pub(super) fn new(number: usize, name: &str, garment: Option<&str>) -> Self {
+        let garment = garment.filter(|_| number > 0).map(String::from);
         Self { number, name: name.to_string(), garment, thickness_mm: None, notes: String::new() }
     }
 

@@ -14,7 +14,7 @@ use super::{
     pending::{Note, PendingTake},
     reading::Subject,
 };
-use crate::{CaptureError, GarmentType, files::sync_parent};
+use crate::{CaptureError, files::sync_parent};
 
 /// A subject that this process alone may change, until the value is dropped. It reads like a [`Subject`].
 ///
@@ -79,12 +79,12 @@ impl LockedSubject {
         self.save()
     }
 
-    /// The next take. `name` comes without a number, or with the number that the take will get; where `garment` is
-    /// `None`, the name may show it (`jeans` are trousers).
+    /// The next take, of a garment of type `garment`. `name` comes without a number, or with the number that the take will
+    /// get.
     ///
     /// # Errors
     /// [`CaptureError`] where the name is unusable or taken, carries another number, or the first take is not the body.
-    pub fn next_take(&self, name: &str, garment: Option<GarmentType>) -> Result<PendingTake, CaptureError> {
+    pub fn next_take(&self, name: &str, garment: Option<&str>) -> Result<PendingTake, CaptureError> {
         let wrong = |reason: String| Err(CaptureError::format(self.folder(), reason));
         let number = self.layers().len();
         let (given, name) = split_number(name);
@@ -114,14 +114,14 @@ impl LockedSubject {
     ///
     /// # Errors
     /// [`CaptureError`] where there is no such layer.
-    pub fn retake(&self, name: &str, garment: Option<GarmentType>) -> Result<PendingTake, CaptureError> {
+    pub fn retake(&self, name: &str, garment: Option<&str>) -> Result<PendingTake, CaptureError> {
         let Some(layer) = self.layer(name) else {
             let names: Vec<_> = self.layers().iter().map(|layer| layer.name.as_str()).collect();
             let reason = format!("there is no layer `{name}` to retake; there are: {}", names.join(", "));
             return Err(CaptureError::format(self.folder(), reason));
         };
         let mut layer = layer.clone();
-        layer.garment = garment.filter(|_| layer.number > 0).or(layer.garment);
+        layer.garment = garment.filter(|_| layer.number > 0).map(String::from).or(layer.garment);
         let path = self.retake_path(&layer);
         if path.exists() {
             // Recorded, but never accepted (the program ended between): nothing that was captured is lost.

@@ -7,7 +7,8 @@ use std::{
 
 use serde_json::json;
 use signal_hook::{consts::SIGINT, flag};
-use toile_capture::{GarmentType, LockedSubject, PendingTake, Source, Subject, printable_path};
+use toile_capture::{LockedSubject, PendingTake, Source, Subject, printable_path};
+use toile_character::GarmentType;
 use toile_live::{Device, Pace, Recorded, RigFile, Stop, record};
 use toile_pipeline::Observer;
 
@@ -86,9 +87,10 @@ impl Capture {
         session: &Session,
     ) -> Result<(Recorded, PathBuf, Option<PathBuf>), StudioError> {
         let mut pending: PendingTake = if self.retake {
-            subject.retake(&self.layer, self.garment)?
+            subject.retake(&self.layer, self.garment.map(GarmentType::name))?
         } else {
-            subject.next_take(&self.layer, self.garment)?
+            let garment = self.garment.or_else(|| GarmentType::from_layer_name(&self.layer));
+            subject.next_take(&self.layer, garment.map(GarmentType::name))?
         };
         let (source, pace) = self.open(subject, &pending)?;
         let mut models: Vec<String> = source.rig().sensors.iter().map(|s| s.identity.model.clone()).collect();

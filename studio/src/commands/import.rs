@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use toile_capture::{
-    GarmentType, LockedSubject, PendingTake, Recorder, RecorderOptions, Replay,
+    LockedSubject, PendingTake, Recorder, RecorderOptions, Replay,
     files::part_path,
     import::{self, Format, ImportReport},
     printable_path,
 };
+use toile_character::GarmentType;
 use toile_pipeline::{Observer, Opened};
 
 use crate::{StudioError, commands::reach::must_exist, outcome::Answer, session::Session};
@@ -83,9 +84,10 @@ impl Import {
         session: &Session,
     ) -> Result<(ImportReport, PathBuf, Option<PathBuf>), StudioError> {
         let mut pending: PendingTake = if self.retake {
-            subject.retake(&self.layer, self.garment)?
+            subject.retake(&self.layer, self.garment.map(GarmentType::name))?
         } else {
-            subject.next_take(&self.layer, self.garment)?
+            let garment = self.garment.or_else(|| GarmentType::from_layer_name(&self.layer));
+            subject.next_take(&self.layer, garment.map(GarmentType::name))?
         };
         pending.rig = opened.source.rig().sensors.first().map_or_else(String::new, |s| s.identity.model.clone());
         pending.source = source_name(&self.folder);
