@@ -1,11 +1,12 @@
 # Two commands do everything on a fresh machine: `make demo` and `make test`.
 
-.PHONY: help setup build demo test bench peers
+.PHONY: help setup build install demo test docs fuzz bench peers
 .DEFAULT_GOAL := help
 
 TOILE := target/release/toile
+PREFIX ?= $(HOME)/.local
 
-help: ## Say what there is
+help: ## List the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
 setup: ## Install what is missing: a C compiler and Rust
@@ -14,17 +15,26 @@ setup: ## Install what is missing: a C compiler and Rust
 build: setup ## Build the program
 	bash scripts/cargo.sh build --release --locked --package toile-studio
 
-demo: build ## Take the shipped recording to an avatar and say where to look
+install: build ## Install the program as PREFIX/bin/toile (PREFIX is ~/.local where it is not given)
+	install -D $(TOILE) $(PREFIX)/bin/toile
+	@bash scripts/on_path.sh $(PREFIX)/bin
+
+demo: build ## Process the shipped recording to an avatar and say where to look
 	$(TOILE) demo
 
-test: demo ## The demo, then all tests, with the outside checkers that can be had here
+test: demo ## The demo, then all tests, with the outside checkers that can be installed here
 	@bash scripts/outside.sh
 	bash scripts/cargo.sh test --release --locked --workspace
 	bash scripts/cargo.sh test --release --locked -p toile-driver-kinect2 --test endurance -- --ignored
+	@bash tests/readme.sh
 	@bash tests/wire/wire.sh
 
-bench: setup ## Benchmarks
+docs: setup ## Build the book (target/book) and the API reference (target/doc)
+	bash scripts/mdbook.sh build docs
+	RUSTDOCFLAGS="-D warnings" bash scripts/cargo.sh doc --release --locked --workspace --no-deps
+
+bench: setup ## Run the benchmarks
 	bash scripts/cargo.sh bench --locked --workspace --benches
 
-peers: build ## Fusion beside Open3D and small_gicp (from PyPI) on the same frames; FRAMES=folder for other frames
+peers: build ## Compare fusion with Open3D and small_gicp (from PyPI) on the same frames; FRAMES=folder for other frames
 	python3 tests/peers/fusion.py $(FRAMES)
