@@ -73,7 +73,10 @@ fn the_book_lists_every_page_of_the_docs() {
     let listed = links(&summary);
     let docs = top().join("docs");
     let inside = |page: &Path| page.strip_prefix(&docs).ok().map(|p| p.display().to_string());
-    let missing: Vec<_> =
-        pages().iter().filter_map(|p| inside(p)).filter(|p| p != "SUMMARY.md" && !listed.contains(&p.as_str())).collect();
+    let missing: Vec<_> = pages()
+        .iter()
+        .filter_map(|p| inside(p))
+        .filter(|p| p != "SUMMARY.md" && !listed.contains(&p.as_str()))
+        .collect();
     assert!(missing.is_empty(), "docs/SUMMARY.md does not list {missing:?}");
 }
