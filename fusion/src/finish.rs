@@ -228,7 +228,7 @@ impl Fuser {
         timings.voxels = field.blocks * crate::tsdf::VOXELS;
         timings.voxels_touched_per_frame = self.touched / self.kept.len().max(1);
         timings.voxels_updated_per_frame = self.updated / self.kept.len().max(1);
-        timings.simd = crate::lanes::instruction_set().into();
+        timings.simd = toile_geometry::lanes::instruction_set().into();
         timings.field_bytes = field.bytes;
         let trajectory = self
             .kept

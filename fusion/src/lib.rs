@@ -17,13 +17,11 @@ pub mod clean_up;
 pub mod closing;
 mod cube_table;
 pub mod depth_filter;
-pub mod element;
 pub mod error;
 mod finish;
 pub mod floor;
 pub mod fuser;
 pub mod integrate;
-mod lanes;
 mod layers;
 pub mod live;
 pub mod motion;
@@ -49,6 +47,9 @@ mod hard_cases;
 mod test_scene;
 #[cfg(test)]
 mod tests;
+
+pub use toile_geometry::element;
+use toile_geometry::lanes::floats as lanes;
 
 pub use error::FusionError;
 pub use fuser::{Fuser, Outcome};
