@@ -21,7 +21,7 @@ pub struct StereoCalibration {
     pub right_from_left: Rigid,
     /// The rectification that came with the calibration.
     pub rectified: Option<GivenRectification>,
-    /// Columns and rows of the images it was made with, where the file tells.
+    /// Columns and rows of the images it was made with, where the file says.
     pub image_size: Option<(u32, u32)>,
 }
 
@@ -89,9 +89,9 @@ fn matrix<'a>(storage: &'a FileStorage, name: &str, what: &str) -> Result<&'a Ma
 
 fn lens(storage: &FileStorage, camera: &str, distortion: &str) -> Result<Lens, String> {
     let m = sized(storage, camera, "camera matrix", 3, 3)?;
-    let [fx, skew, cx, zero, fy, cy, ..] = m.data[..] else { return Err(format!("{camera} is no 3x3 matrix")) };
+    let [fx, skew, cx, zero, fy, cy, ..] = m.data[..] else { return Err(format!("{camera} is not a 3x3 matrix")) };
     if !(fx > 0.0 && fy > 0.0) || skew != 0.0 || zero != 0.0 {
-        return Err(format!("{camera} is no camera matrix: focal lengths {fx} and {fy}, skew {skew}"));
+        return Err(format!("{camera} is not a camera matrix: focal lengths {fx} and {fy}, skew {skew}"));
     }
     let given = &matrix(storage, distortion, "lens distortion")?.data;
     // 4, 5, 8, 12 or 14 coefficients (docs.opencv.org, calib3d): beyond eight come thin prism and tilt.
@@ -124,7 +124,7 @@ fn rotation_matrix(storage: &FileStorage, name: &str, what: &str) -> Result<Rota
     let m = Matrix3::from_row_slice(&sized(storage, name, what, 3, 3)?.data);
     let off = (m * m.transpose() - Matrix3::identity()).amax();
     if !(off <= ROTATION_TOLERANCE && m.determinant() > 0.0) {
-        return Err(format!("{name} ({what}) is no rotation: R Rᵀ is off by {off:.1e}"));
+        return Err(format!("{name} ({what}) is not a rotation: R Rᵀ is off by {off:.1e}"));
     }
     Ok(Rotation3::from_matrix_unchecked(m))
 }

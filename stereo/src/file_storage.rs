@@ -88,7 +88,7 @@ fn numbers(body: &str) -> Result<Vec<f64>, String> {
     let list = list.strip_prefix('[').and_then(|l| l.split_once(']')).ok_or("`data` has no [ ... ]")?.0;
     let finite = |word: &str| match word.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!("`{}` is no number", word.chars().take(40).collect::<String>())),
+        _ => Err(format!("`{}` is not a number", word.chars().take(40).collect::<String>())),
     };
     list.split(',').map(str::trim).filter(|w| !w.is_empty()).map(finite).collect()
 }

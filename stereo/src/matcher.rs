@@ -33,22 +33,33 @@ pub struct DisparityMap {
 ///
 /// Five paths a pixel (left, right and the three from above), all in one pass over the rows: memory is a few rows.
 /// A pixel has an answer where its winner is unique, the right image agrees, both neighbours of the winner were searched
-/// (so nothing at infinity), and it is part of no small island.
+/// (so nothing at infinity), and it does not belong to a small island.
 ///
 /// # Errors
 /// [`StereoError::Images`] where the images differ in size, [`StereoError::Settings`] where a setting is out of range.
 pub fn match_pair(left: &GrayImage, right: &GrayImage, settings: &MatchSettings) -> Result<DisparityMap, StereoError> {
-    match_with(left, right, settings, Machine::Best, STRIP_ROWS)
+    match_with(left, right, settings, Machine::best(), STRIP_ROWS)
 }
 
 /// Which vector operations to use.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) enum Machine {
-    /// The best that this processor has.
-    Best,
+    /// Those of AVX2, with the proof that this processor has them.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(pulp::x86::V3),
     /// Plain Rust.
-    #[cfg(test)]
     Portable,
+}
+
+impl Machine {
+    /// The best that this processor has.
+    pub(crate) fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            return Self::Avx2(simd);
+        }
+        Self::Portable
+    }
 }
 
 pub(crate) fn match_with(
@@ -67,7 +78,7 @@ pub(crate) fn match_with(
     let mut values = vec![0.0; w * h];
     values.par_chunks_mut(w * strip_rows).enumerate().for_each(|(i, out)| {
         let first = i * strip_rows;
-        match_strip(Strip { left, right, settings, first, lead: LEAD_ROWS.min(first), out }, machine);
+        dispatch(Strip { left, right, settings, first, lead: LEAD_ROWS.min(first), out }, machine);
     });
     if settings.median {
         values = median(&values, w);
@@ -87,27 +98,24 @@ struct Strip<'a> {
 }
 
 /// Chooses the code compiled for the number of disparities.
-fn match_strip(strip: Strip<'_>, machine: Machine) {
+fn dispatch(strip: Strip<'_>, machine: Machine) {
     match (strip.settings.disparities as usize).div_ceil(LANES) {
-        0..=1 => match_strip_of::<1>(strip, machine),
-        2 => match_strip_of::<2>(strip, machine),
-        3 => match_strip_of::<3>(strip, machine),
-        4 => match_strip_of::<4>(strip, machine),
-        5..=6 => match_strip_of::<6>(strip, machine),
-        _ => match_strip_of::<8>(strip, machine),
+        0..=1 => run::<1>(strip, machine),
+        2 => run::<2>(strip, machine),
+        3 => run::<3>(strip, machine),
+        4 => run::<4>(strip, machine),
+        5..=6 => run::<6>(strip, machine),
+        _ => run::<8>(strip, machine),
     }
 }
 
 /// Chooses the code compiled for this processor.
-fn match_strip_of<const N: usize>(strip: Strip<'_>, machine: Machine) {
-    #[cfg(target_arch = "x86_64")]
-    if machine == Machine::Best
-        && let Some(simd) = pulp::x86::V3::try_new()
-    {
-        return simd.vectorize(WithAvx2::<N> { simd, strip });
+fn run<const N: usize>(strip: Strip<'_>, machine: Machine) {
+    match machine {
+        #[cfg(target_arch = "x86_64")]
+        Machine::Avx2(simd) => simd.vectorize(WithAvx2::<N> { simd, strip }),
+        Machine::Portable => match_rows::<_, N>(Portable, strip),
     }
-    let _ = machine;
-    match_rows::<_, N>(Portable, strip);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -126,21 +134,24 @@ impl<const N: usize> pulp::NullaryFnOnce for WithAvx2<'_, N> {
     }
 }
 
-/// Everything below is inlined into one function, so that all of it is compiled for the processor it was chosen for.
+/// Matches the rows of a strip, one after the other. Everything below is inlined into one function, so that all of it is
+/// compiled for the processor it was chosen for.
 #[inline(always)]
 fn match_rows<L: Lanes, const N: usize>(lanes: L, strip: Strip<'_>) {
-    let w = strip.left.width as usize;
-    let rows = strip.first - strip.lead..strip.first + strip.out.len() / w;
-    let margin = strip.settings.min_disparity as usize + N * LANES;
-    let left = census::transform(strip.left, rows.clone(), false, 0);
-    let right = census::transform(strip.right, rows, true, margin);
-    let mut matcher = RowMatcher::<N>::new(w, strip.settings);
-    for v in 0..strip.lead {
-        matcher.advance(lanes, &left, &right, v);
-    }
-    for (k, out) in strip.out.chunks_exact_mut(w).enumerate() {
-        matcher.advance(lanes, &left, &right, strip.lead + k);
-        matcher.answer(out);
+    let Strip { left, right, settings, first, lead, out } = strip;
+    let w = left.width as usize;
+    let rows = first - lead..first + out.len() / w;
+    let margin = settings.min_disparity as usize + N * LANES;
+    let left = census::transform(left, rows.clone(), false, 0);
+    let right = census::transform(right, rows.clone(), true, margin);
+    let mut matcher = RowMatcher::<N>::new(w, settings);
+    for v in 0..rows.len() {
+        matcher.match_row(lanes, &left, &right, v);
+        matcher.aggregate_row(lanes);
+        matcher.select_row(lanes);
+        if v >= lead {
+            matcher.answer(&mut out[(v - lead) * w..][..w]);
+        }
     }
 }
 
@@ -162,7 +173,7 @@ mod tests {
             let settings = bare(min, count);
             let found = match_pair(&left, &right, &settings).unwrap();
             assert_eq!(found.values, brute_force(&left, &right, &settings), "{min} {count}");
-            assert!(found.values.iter().filter(|&&d| d > 0.0).count() > 300, "too few answers to tell");
+            assert!(found.values.iter().filter(|&&d| d > 0.0).count() > 300, "too few answers to judge by");
         }
     }
 
@@ -172,7 +183,7 @@ mod tests {
             let left = noise(150, 30, u64::from(count));
             let right = shifted(&left, 13, 5);
             let settings = MatchSettings { disparities: count, ..MatchSettings::default() };
-            let best = match_with(&left, &right, &settings, Machine::Best, STRIP_ROWS).unwrap();
+            let best = match_with(&left, &right, &settings, Machine::best(), STRIP_ROWS).unwrap();
             let portable = match_with(&left, &right, &settings, Machine::Portable, STRIP_ROWS).unwrap();
             assert_eq!(best, portable, "{count}");
         }
@@ -189,7 +200,7 @@ mod tests {
         };
         let (one, four) = (with(1), with(4));
         assert_eq!(one, four);
-        let whole = match_with(&left, &right, &settings, Machine::Best, 10_000).unwrap();
+        let whole = match_with(&left, &right, &settings, Machine::best(), 10_000).unwrap();
         let other = one.values.iter().zip(&whole.values).filter(|(a, b)| (*a - *b).abs() > 0.25).count();
         assert!(other * 500 < whole.values.len(), "{other} pixels differ from matching without strips");
     }

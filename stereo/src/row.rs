@@ -53,31 +53,10 @@ impl<const N: usize> RowMatcher<N> {
         }
     }
 
-    /// Matches the next row, which is row `v` of the two census images (the right one mirrored).
+    /// Matching costs of row `v` of the two census images (the right one mirrored): differing bits of each pixel and its
+    /// candidates; candidates beyond the right image cost the most.
     #[inline(always)]
-    pub fn advance<L: Lanes>(&mut self, lanes: L, left: &Census, right: &Census, v: usize) {
-        self.matching_costs(lanes, left, right, v);
-        self.paths_from_left_and_above(lanes);
-        self.paths_from_right(lanes);
-        std::mem::swap(&mut self.above, &mut self.current);
-    }
-
-    /// Disparities of the row that was matched last.
-    #[inline(always)]
-    pub fn answer(&self, out: &mut [f32]) {
-        for (x, (out, winner)) in out.iter_mut().zip(&self.winners).enumerate() {
-            let disparity = self.first_disparity + usize::from(winner.index);
-            let agrees = disparity <= x && {
-                let other = self.right_winners[self.width - 1 - x + disparity];
-                other.abs_diff(winner.index) <= self.left_right
-            };
-            *out = if winner.is_unique && agrees { disparity as f32 + winner.fraction } else { 0.0 };
-        }
-    }
-
-    /// Differing bits of each pixel and its candidates; candidates beyond the right image cost the most.
-    #[inline(always)]
-    fn matching_costs<L: Lanes>(&mut self, lanes: L, left: &Census, right: &Census, v: usize) {
+    pub fn match_row<L: Lanes>(&mut self, lanes: L, left: &Census, right: &Census, v: usize) {
         let (lefts, rights) = (left.planes(v), right.planes(v));
         for (x, costs) in self.costs.iter_mut().enumerate() {
             let start = self.width - 1 - x + self.first_disparity;
@@ -97,9 +76,9 @@ impl<const N: usize> RowMatcher<N> {
         }
     }
 
-    /// Four of the five paths, and their sums.
+    /// Four of the five paths, from the left and from above, and their sums.
     #[inline(always)]
-    fn paths_from_left_and_above<L: Lanes>(&mut self, lanes: L) {
+    pub fn aggregate_row<L: Lanes>(&mut self, lanes: L) {
         self.along.clear();
         for (x, (costs, sums)) in self.costs.iter().zip(&mut self.sums).enumerate() {
             let costs = load(lanes, costs);
@@ -118,9 +97,10 @@ impl<const N: usize> RowMatcher<N> {
         }
     }
 
-    /// The fifth path, which completes the sums: the winners of the left and of the right image follow at once.
+    /// The fifth path, from the right, which completes the sums: the winners of the left and of the right image follow at
+    /// once. The row is done with this.
     #[inline(always)]
-    fn paths_from_right<L: Lanes>(&mut self, lanes: L) {
+    pub fn select_row<L: Lanes>(&mut self, lanes: L) {
         self.along.clear();
         self.right_sums.fill(u16::MAX);
         for x in (0..self.width).rev() {
@@ -134,6 +114,20 @@ impl<const N: usize> RowMatcher<N> {
             let right_sums = &mut self.right_sums[start..][..N * LANES];
             challenge(lanes, sums, right_sums, &mut self.right_winners[start..][..N * LANES]);
             self.winners[x] = winner(lanes, sums, self.uniqueness);
+        }
+        std::mem::swap(&mut self.above, &mut self.current);
+    }
+
+    /// Disparities of the row that was matched last.
+    #[inline(always)]
+    pub fn answer(&self, out: &mut [f32]) {
+        for (x, (out, winner)) in out.iter_mut().zip(&self.winners).enumerate() {
+            let disparity = self.first_disparity + usize::from(winner.index);
+            let agrees = disparity <= x && {
+                let other = self.right_winners[self.width - 1 - x + disparity];
+                other.abs_diff(winner.index) <= self.left_right
+            };
+            *out = if winner.is_unique && agrees { disparity as f32 + winner.fraction } else { 0.0 };
         }
     }
 }
