@@ -5,6 +5,7 @@
 //! - [`clock`]: which clock stamps frames, and its fit to the host's;
 //! - [`tick_clock`]: a device's ticks, which wrap, as a time that does not;
 //! - [`pairing`]: depth and colour of one time to one frame, for devices that send them apart;
+//! - [`pixels`]: what cameras send to images: depth, grey, YUYV, JPEG markers;
 //! - [`Source`]: what live devices, replay and the synthetic sensor have in common;
 //! - [`Recorder`] writes frames to an MCAP file, [`Replay`] is the file as a source; [`depth_codec`] packs depth;
 //! - [`import`](mod@import) reads other people's folders; [`Subject`] is a person's folder with its takes,
@@ -58,6 +59,7 @@ pub mod import;
 pub mod inspect;
 mod message;
 pub mod pairing;
+pub mod pixels;
 mod printable;
 mod protobuf;
 pub mod recording;
