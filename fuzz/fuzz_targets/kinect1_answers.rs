@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use toile_driver_kinect1::{Calibration, protocol, registration::Registration};
+use toile_driver_kinect1::{Calibration, Registration, protocol};
 
 fuzz_target!(|input: (Vec<u8>, Vec<u8>, Vec<u8>, Vec<u8>)| {
     let (fixed, registration, padding, shift) = &input;

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use toile_driver_kinect1::{assembler::Assembler, decode, protocol::Stream};
+use toile_driver_kinect1::{Assembler, decode, protocol::Stream};
 use toile_driver_transport::PacketStatus;
 
 fuzz_target!(|packets: Vec<Vec<u8>>| {

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use toile_driver_kinect2::{color, color_stream::ColorStream, depth_stream::DepthStream, protocol};
+use toile_driver_kinect2::{ColorStream, DepthStream, color, protocol};
 use toile_driver_transport::PacketStatus;
 
 fuzz_target!(|pieces: Vec<Vec<u8>>| {

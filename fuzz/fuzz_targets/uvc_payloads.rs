@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use toile_driver_realsense::metadata;
-use toile_driver_transport::video::uvc::Assembler;
+use toile_driver_transport::simulated::uvc::Assembler;
 
 fuzz_target!(|input: (bool, Vec<Vec<u8>>)| {
     let (is_whole, payloads) = input;

@@ -11,8 +11,8 @@ use std::{
 
 use toile_capture::{CaptureError, Frame, Replay, Rig, Source};
 use toile_driver_kinect1::{Kinect1, Settings};
-use toile_driver_models::kinect1::{CameraModel, Fault, Pattern, Stream, StreamFault};
-use toile_driver_transport::twin::VirtualBus;
+use toile_driver_simulated::kinect1::{Fault, Pattern, SimulatedCamera, Stream, StreamFault};
+use toile_driver_transport::simulated::SimulatedBus;
 use toile_live::{LiveError, Pace, Recorded, Stop, record};
 
 fn frames(path: &Path) -> Vec<Frame> {
@@ -22,8 +22,8 @@ fn frames(path: &Path) -> Vec<Frame> {
 }
 
 fn kinect(faults: Vec<Fault>) -> Box<dyn Source> {
-    let bus = VirtualBus::default();
-    bus.plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()).with_faults(faults))));
+    let bus = SimulatedBus::default();
+    bus.plug(Arc::new(Mutex::new(SimulatedCamera::new(Pattern::default()).with_faults(faults))));
     Box::new(Kinect1::open(&bus, None, Settings::default()).unwrap())
 }
 
@@ -49,9 +49,9 @@ fn an_unplug_ends_the_take_with_every_frame_that_came() {
 #[test]
 fn a_camera_that_is_plugged_in_again_records_the_next_take() {
     let dir = tempfile::tempdir().unwrap();
-    let bus = VirtualBus::default();
+    let bus = SimulatedBus::default();
     let take = |name: &String, faults: Vec<Fault>| {
-        let model = CameraModel::new(Pattern::default()).with_faults(faults);
+        let model = SimulatedCamera::new(Pattern::default()).with_faults(faults);
         let info = bus.plug(Arc::new(Mutex::new(model)));
         let limit = Duration::from_secs(1);
         toile_driver_transport::wait_for(&bus, |info| info.product == 0x02ae, limit).unwrap();

@@ -15,8 +15,8 @@ use std::{
 use common::{exits, toile};
 use toile_capture::{Frame, Replay, Source};
 use toile_driver_kinect1::{Kinect1, Settings};
-use toile_driver_models::kinect1::{CameraModel, Pattern};
-use toile_driver_transport::twin::VirtualBus;
+use toile_driver_simulated::kinect1::{Pattern, SimulatedCamera};
+use toile_driver_transport::simulated::SimulatedBus;
 use toile_live::{Pace, Stop, record};
 
 fn frames(path: &Path) -> Vec<Frame> {
@@ -27,8 +27,8 @@ fn frames(path: &Path) -> Vec<Frame> {
 
 /// Half a second of a camera made of code.
 fn record_kinect(path: &Path) {
-    let bus = VirtualBus::default();
-    bus.plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()))));
+    let bus = SimulatedBus::default();
+    bus.plug(Arc::new(Mutex::new(SimulatedCamera::new(Pattern::default()))));
     let kinect = Box::new(Kinect1::open(&bus, None, Settings::default()).unwrap());
     record(kinect, path, (Stop::After(0.5), Pace::Live), &AtomicBool::new(false), &mut |_| {}).unwrap();
 }

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs as the virtual machine's first program, as root: models behind the virtual host controller, and their clients.
+# Runs as the virtual machine's first program, as root: simulated devices behind the virtual host controller, and their clients.
 # Lines of the checks go to /out/result, takes to /out for the host to compare, all else to /out/log.
 top=$(cd "$(dirname "$0")/../.." && pwd)
 rig="$top/target/outside/wire"

@@ -17,8 +17,8 @@ use std::{
 
 use toile_capture::{ColorImage, Frame, Source};
 use toile_driver_kinect1::{Kinect1, Settings};
-use toile_driver_models::{
-    kinect1::{CameraModel, Content, Pattern},
+use toile_driver_simulated::{
+    kinect1::{Content, Pattern, SimulatedCamera},
     proof::{self, Bench, Shown, same},
     vhci::{self, Plugged},
 };
@@ -35,7 +35,7 @@ fn main() -> Outcome<()> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
         ["serve"] => {
-            // The kernel lets go when it is told to; what was being written then is of no use to it.
+            // The kernel lets go when it is asked to; what was being written then is of no use to it.
             if let Err(error) = plug()?.wait() {
                 println!("server: {error}");
             }
@@ -53,7 +53,7 @@ fn main() -> Outcome<()> {
 }
 
 fn plug() -> io::Result<Plugged> {
-    vhci::plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()))))
+    vhci::plug(Arc::new(Mutex::new(SimulatedCamera::new(Pattern::default()))))
 }
 
 struct Wire {

@@ -17,15 +17,15 @@ const ZERO_PLANE: usize = 94;
 /// (libfreenect `src/registration.c`, `S2D_CONST_OFFSET` and `parameter_coefficient`).
 pub(crate) const OFFSET: f64 = 0.375;
 const RAW_PER_PIXEL: f64 = 4.0;
-/// Distances are told in hundredths of metres (libfreenect `shift_scale`).
+/// Distances are stated in hundredths of metres (libfreenect `shift_scale`).
 const MM_PER_CM: f64 = 10.0;
 /// Beyond this the sensor's steps are longer than half a metre (libfreenect `FREENECT_DEPTH_MM_MAX_VALUE`).
 pub const MAX_MM: u16 = 10_000;
-/// The colour camera is this far from the depth camera, centimetres. The device tells 2.3; libfreenect (after OpenNI)
-/// uses 2.4 whatever it tells.
+/// The colour camera is this far from the depth camera, centimetres. The device states 2.3; libfreenect (after OpenNI)
+/// uses 2.4 whatever it states.
 const COLOR_CM: f64 = 2.4;
 
-/// What the camera tells about itself.
+/// What the camera states about itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// Emitter to depth camera, centimetres.
@@ -98,12 +98,12 @@ impl Calibration {
     /// Numbers far from those of every known Kinect (focal length 575 to 595 pixels, emitter at 7.5 cm, constant shift
     /// 200) are nonsense of the firmware, not a calibration.
     fn check(&self) -> Result<(), Kinect1Error> {
-        let within = |what: &str, value: f64, least: f64, most: f64| {
+        let within = |what: &str, value: f64, min: f64, max: f64| {
             // NaN is not within.
-            if (least..=most).contains(&value) {
+            if (min..=max).contains(&value) {
                 return Ok(());
             }
-            Err(Kinect1Error::Calibration(format!("{what} is {value}, which is not between {least} and {most}")))
+            Err(Kinect1Error::Calibration(format!("{what} is {value}, which is not between {min} and {max}")))
         };
         within("the emitter's distance", self.emitter_cm, 3.0, 15.0)?;
         within("the zero plane's distance", self.reference, 40.0, 300.0)?;

@@ -53,7 +53,7 @@ impl Commands {
         device: &mut dyn UsbDevice,
         code: u16,
         words: &[u16],
-        least: usize,
+        min: usize,
     ) -> Result<Vec<u8>, Kinect1Error> {
         let tag = self.tag;
         self.tag = self.tag.wrapping_add(1);
@@ -61,8 +61,8 @@ impl Commands {
         let bytes = self.fetch(device, code)?;
         let wrong = |reason| Kinect1Error::Answer { command: code, reason };
         let data = answer(&bytes, code, tag).map_err(wrong)?;
-        if data.len() < least {
-            return Err(wrong(format!("the answer has {} bytes instead of {least}", data.len())));
+        if data.len() < min {
+            return Err(wrong(format!("the answer has {} bytes instead of {min}", data.len())));
         }
         Ok(data.to_vec())
     }

@@ -32,7 +32,7 @@ pub fn unpack(bytes: &[u8], bits: u32) -> Vec<u16> {
     values
 }
 
-/// Raw depth of ten bits as that of eleven: the lowest bit is what it lacks, so 1023 is no depth.
+/// Raw depth of ten bits as that of eleven: the lowest bit is what it lacks, so 1023 means that there is no depth.
 pub fn eleven_from_ten(raw: &mut [u16]) {
     raw.iter_mut().for_each(|value| *value = if *value >= 1023 { NO_DEPTH } else { *value << 1 });
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use toile_driver_transport::{Bus, DeviceInfo, Setup, UsbDevice, open_known};
 
-use crate::{Kinect1Error, device::MICROSOFT};
+use crate::{Kinect1Error, find::MICROSOFT};
 
 /// Product id of the motor (libfreenect `src/freenect_internal.h`).
 const MOTOR: u16 = 0x02b0;
@@ -17,7 +17,7 @@ const COUNTS_PER_G: f64 = 819.0;
 /// Metres a second squared.
 const G: f64 = 9.806_65;
 /// The motor must not be driven farther (libfreenect `MAX_TILT_ANGLE`), degrees.
-const MOST_TILT: f64 = 31.0;
+const MAX_TILT: f64 = 31.0;
 /// Each request is answered at once or never.
 const LIMIT: Duration = Duration::from_millis(500);
 
@@ -80,7 +80,7 @@ impl Motor {
     /// # Errors
     /// [`Kinect1Error::Transport`] where the request fails.
     pub fn set_tilt(&mut self, angle: f64) -> Result<(), Kinect1Error> {
-        let half_degrees = 2.0 * angle.to_degrees().clamp(-MOST_TILT, MOST_TILT);
+        let half_degrees = 2.0 * angle.to_degrees().clamp(-MAX_TILT, MAX_TILT);
         // Two's complement in sixteen bits, as libfreenect sends it; a NaN is level.
         self.device.control_out(Setup::vendor_out(SET_TILT, half_degrees.round() as i16 as u16), &[], LIMIT)?;
         Ok(())

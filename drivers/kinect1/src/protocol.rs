@@ -4,7 +4,7 @@
 pub const VIDEO_ENDPOINT: u8 = 0x81;
 /// Depth endpoint (`freenect_start_depth`).
 pub const DEPTH_ENDPOINT: u8 = 0x82;
-/// Bytes of an isochronous packet where the descriptors do not tell (libfreenect `src/usb_libusb10.h`).
+/// Bytes of an isochronous packet where the descriptors do not say (libfreenect `src/usb_libusb10.h`).
 pub const PACKET_ROOM: usize = 1920;
 /// Bytes of a packet's header (`struct pkt_hdr` in libfreenect `src/cameras.c`).
 const HEADER: usize = 12;
@@ -73,7 +73,7 @@ pub struct Packet<'a> {
     pub data: &'a [u8],
 }
 
-/// Why bytes are no packet.
+/// Why bytes are not a packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PacketFault {
     /// Fewer bytes than a header.
@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_packet_is_told_from_what_is_none() {
+    fn a_packet_is_distinguished_from_other_bytes() {
         let mut bytes = vec![b'R', b'B', 0, 0x75, 0, 200, 0, 0, 1, 2, 0, 0, 9, 9];
         let packet = parse_packet(Stream::Depth, &bytes).unwrap();
         assert_eq!(packet, Packet { role: Role::Last, sequence: 200, ticks: 513, data: &[9, 9] });

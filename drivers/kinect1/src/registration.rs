@@ -71,7 +71,7 @@ impl Registration {
         out
     }
 
-    /// The depth camera: no centre is told, so the image's.
+    /// The depth camera: the camera does not state its centre, so the image's.
     pub fn depth_camera(&self) -> PinholeCamera {
         let (cx, cy) = ((WIDTH - 1) as f64 / 2.0, (HEIGHT - 1) as f64 / 2.0);
         PinholeCamera::ideal(WIDTH as u32, HEIGHT as u32, self.focal, self.focal, cx, cy)
@@ -102,11 +102,11 @@ fn line(points: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
 
 /// dx and dy of every pixel by third-order differences in fixed point, as the device means them (libfreenect
 /// `freenect_create_dxdy_tables`; the shifts clamp to 32 bits on purpose).
-fn polynomials(told: &[i32; 29]) -> Vec<[f64; 2]> {
-    let start = |i: usize| i64::from((told[i] << 13) >> 4);
-    let first = |i: usize| i64::from((told[i] << 11) >> 3);
-    let second = |i: usize| i64::from((told[i] << 5) << 3);
-    let third = |i: usize| i64::from(told[i]);
+fn polynomials(stated: &[i32; 29]) -> Vec<[f64; 2]> {
+    let start = |i: usize| i64::from((stated[i] << 13) >> 4);
+    let first = |i: usize| i64::from((stated[i] << 11) >> 3);
+    let second = |i: usize| i64::from((stated[i] << 5) << 3);
+    let third = |i: usize| i64::from(stated[i]);
     // Value, its change along a column step and that change's change; the same three changed by a row step.
     let mut x = Row {
         value: start(5),

@@ -8,8 +8,8 @@ use std::time::Instant;
 use common::{depth_fault, faulty, has_color_of, has_depth_of, plugged, settings, video_fault};
 use toile_capture::Source;
 use toile_driver_kinect1::{Kinect1, Settings};
-use toile_driver_models::{
-    kinect1::{CameraModel, CommandFault, Pattern, StreamFault},
+use toile_driver_simulated::{
+    kinect1::{CommandFault, Pattern, SimulatedCamera, StreamFault},
     trials::take,
 };
 
@@ -48,7 +48,7 @@ fn short_long_and_mislabelled_packets_are_bad() {
         StreamFault::Short(12),
         StreamFault::Short(5),
         StreamFault::Long(60),
-        StreamFault::BadMagic,
+        StreamFault::BadBegin,
         StreamFault::BadFlag,
     ] {
         for packet in [0, 100, 241] {
@@ -65,7 +65,7 @@ fn a_torn_frame_is_dropped_and_the_next_one_is_whole() {
 }
 
 #[test]
-fn late_packets_are_no_loss() {
+fn late_packets_are_not_a_loss() {
     let mut kinect = faulty(&[depth_fault(2, 30, StreamFault::Late(20)), video_fault(3, 0, StreamFault::Late(90))]);
     let (frames, _) = take(&mut kinect, 6);
     assert!(frames.iter().zip(0..).all(|(f, k)| has_depth_of(f, k) && has_color_of(f, k) && f.lost_before == 0));
@@ -76,15 +76,15 @@ fn a_lost_colour_image_leaves_depth_alone_and_a_lost_pair_is_a_lost_frame() {
     let lost = StreamFault::Lost(1);
     let mut kinect = faulty(&[video_fault(1, 9, lost), video_fault(3, 9, lost), depth_fault(3, 9, lost)]);
     let (frames, _) = take(&mut kinect, 4);
-    let told = frames.iter().map(|f| (f.device_frame, f.lost_before, f.depth.is_some(), f.color.is_some()));
-    let told: Vec<_> = told.collect();
-    assert_eq!(told, [(0, 0, true, true), (1, 0, true, false), (2, 0, true, true), (4, 1, true, true)]);
+    let stated = frames.iter().map(|f| (f.device_frame, f.lost_before, f.depth.is_some(), f.color.is_some()));
+    let stated: Vec<_> = stated.collect();
+    assert_eq!(stated, [(0, 0, true, true), (1, 0, true, false), (2, 0, true, true), (4, 1, true, true)]);
     let health = kinect.health();
     assert_eq!((health.lost_frames, health.alone, health.video.packets), (1, [1, 0], 2));
 }
 
 #[test]
-fn a_silent_stream_is_woken_once_and_then_told() {
+fn a_silent_stream_is_restarted_once_and_then_reported() {
     let mut kinect = faulty(&[depth_fault(3, 40, StreamFault::Silent), video_fault(3, 40, StreamFault::Silent)]);
     let (frames, error) = take(&mut kinect, 12);
     assert!(error.is_none(), "{error:?}");
@@ -103,7 +103,7 @@ fn a_silent_stream_is_woken_once_and_then_told() {
 #[test]
 fn a_time_that_cannot_be_costs_its_picture_only() {
     for ticks in [600_000_000, 3_000_000_000] {
-        let mut kinect = faulty(&[depth_fault(2, 0, StreamFault::Ticks(ticks))]);
+        let mut kinect = faulty(&[depth_fault(2, 0, StreamFault::Time(ticks))]);
         let (frames, error) = take(&mut kinect, 6);
         assert!(error.is_none(), "{error:?}");
         for (frame, k) in frames.iter().zip(0..) {
@@ -136,7 +136,7 @@ fn firmware_that_answers_nonsense_is_refused_in_words() {
         (CommandFault::Nonsense, "begins with ff ff"),
         (CommandFault::Slow(u32::MAX), "no answer in 50 ms"),
     ] {
-        let mut model = CameraModel::new(Pattern::default());
+        let mut model = SimulatedCamera::new(Pattern::default());
         model.set_command_fault(Some(fault));
         let (bus, ..) = plugged(model);
         let start = Instant::now();
@@ -148,7 +148,7 @@ fn firmware_that_answers_nonsense_is_refused_in_words() {
 
 #[test]
 fn slow_answers_are_waited_for() {
-    let mut model = CameraModel::new(Pattern::default());
+    let mut model = SimulatedCamera::new(Pattern::default());
     model.set_command_fault(Some(CommandFault::Slow(3)));
     let (bus, ..) = plugged(model);
     // As patient as the driver is by itself: the machine may be busy.

@@ -8,12 +8,12 @@ use std::sync::{Arc, Mutex};
 use common::{has_color_of, has_depth_of, mm, plugged, settings};
 use toile_capture::{ClockDomain, ColorImage, Source};
 use toile_driver_kinect1::{DepthMode, Kinect1, Led, Motor, Settings, VideoMode};
-use toile_driver_models::kinect1::{CameraModel, Content, MotorModel, Optics, Pattern, Rendered};
+use toile_driver_simulated::kinect1::{Content, Optics, Pattern, Rendered, SimulatedCamera, SimulatedMotor};
 use toile_synthetic::{Subject, SyntheticSettings, sensor::SensorPreset};
 
 #[test]
 fn a_hundred_frames_are_identical_and_none_is_lost() {
-    let (bus, ..) = plugged(CameraModel::new(Pattern::default()));
+    let (bus, ..) = plugged(SimulatedCamera::new(Pattern::default()));
     let mut kinect = Kinect1::open(&bus, None, settings()).unwrap();
     for k in 0..100 {
         let frame = kinect.next_frame().unwrap().unwrap();
@@ -28,7 +28,7 @@ fn a_hundred_frames_are_identical_and_none_is_lost() {
 
 #[test]
 fn the_sensor_says_who_it_is_and_the_camera_is_left_switched_off() {
-    let (bus, _, model) = plugged(CameraModel::new(Pattern::default()).with_serial("B7"));
+    let (bus, _, model) = plugged(SimulatedCamera::new(Pattern::default()).with_serial("B7"));
     let kinect = Kinect1::open(&bus, Some("B7"), settings()).unwrap();
     let identity = kinect.rig().sensors[0].identity.clone();
     assert_eq!((identity.serial.as_str(), identity.firmware.as_str()), ("B7", "1.0b"));
@@ -43,7 +43,7 @@ fn the_sensor_says_who_it_is_and_the_camera_is_left_switched_off() {
 
 #[test]
 fn ten_bits_are_the_upper_ten() {
-    let (bus, ..) = plugged(CameraModel::new(Pattern::default()));
+    let (bus, ..) = plugged(SimulatedCamera::new(Pattern::default()));
     let settings = Settings { depth: DepthMode::Ten, video: VideoMode::Off, ..settings() };
     let mut kinect = Kinect1::open(&bus, None, settings).unwrap();
     for k in 0..3 {
@@ -56,7 +56,7 @@ fn ten_bits_are_the_upper_ten() {
 
 #[test]
 fn infrared_comes_as_grey_beside_the_depth() {
-    let (bus, ..) = plugged(CameraModel::new(Pattern::default()));
+    let (bus, ..) = plugged(SimulatedCamera::new(Pattern::default()));
     let settings = Settings { video: VideoMode::Infrared, ..settings() };
     let mut kinect = Kinect1::open(&bus, None, settings).unwrap();
     for k in 0..3 {
@@ -73,7 +73,7 @@ fn infrared_comes_as_grey_beside_the_depth() {
 #[test]
 fn registration_is_within_half_a_pixel_of_the_optics() {
     for optics in [Optics::default(), Optics::new(525.0, [316.2, 243.7]), Optics::new(531.5, [322.0, 255.4])] {
-        let (bus, ..) = plugged(CameraModel::new(Pattern { optics }));
+        let (bus, ..) = plugged(SimulatedCamera::new(Pattern { optics }));
         let kinect = Kinect1::open(&bus, None, settings()).unwrap();
         let sensor = &kinect.rig().sensors[0];
         let mut worst = [0.0_f64; 2];
@@ -81,8 +81,8 @@ fn registration_is_within_half_a_pixel_of_the_optics() {
             for mm in [500_u16, 800, 1200, 2600, 5000, 8000] {
                 let z = f64::from(mm) * 1e-3;
                 let truth = optics.color_pixel(u as f64, v as f64, z);
-                let told = kinect.registration().color_pixel(u, v, mm);
-                worst[0] = worst[0].max((told[0] - truth[0]).hypot(told[1] - truth[1]));
+                let stated = kinect.registration().color_pixel(u, v, mm);
+                worst[0] = worst[0].max((stated[0] - truth[0]).hypot(stated[1] - truth[1]));
                 // The cameras of the rig say the same as the tables.
                 let point = sensor.color_from_depth * sensor.depth.unproject(u as f64, v as f64, z);
                 let camera = sensor.color.unwrap().project(&point).unwrap();
@@ -106,7 +106,7 @@ fn registered_depth_of_a_rendered_person_is_where_colour_has_it() {
     };
     let subject = Subject::new(&scene).unwrap();
     let mut truth = Rendered::new(subject.take(0).unwrap());
-    let (bus, ..) = plugged(CameraModel::new(Rendered::new(subject.take(0).unwrap())));
+    let (bus, ..) = plugged(SimulatedCamera::new(Rendered::new(subject.take(0).unwrap())));
     let open = |registered| Kinect1::open(&bus, None, Settings { registered, ..settings() }).unwrap();
     let as_measured = open(false).next_frame().unwrap().unwrap().depth.unwrap();
     let registered = open(true).next_frame().unwrap().unwrap().depth.unwrap();
@@ -137,8 +137,8 @@ fn registered_depth_of_a_rendered_person_is_where_colour_has_it() {
 
 #[test]
 fn led_tilt_and_accelerometer() {
-    let (bus, camera, _) = plugged(CameraModel::new(Pattern::default()));
-    let board = Arc::new(Mutex::new(MotorModel::default()));
+    let (bus, camera, _) = plugged(SimulatedCamera::new(Pattern::default()));
+    let board = Arc::new(Mutex::new(SimulatedMotor::default()));
     bus.plug(board.clone());
     let mut motor = Motor::open(&bus, Some(&camera)).unwrap();
     motor.set_led(Led::BlinkingRedYellow).unwrap();

@@ -8,8 +8,8 @@ use criterion::{
     Criterion, criterion_group, criterion_main,
     measurement::{Measurement, ValueFormatter, WallTime},
 };
-use toile_driver_kinect2::{Calibration, DecodeSettings, Decoder, color, registration::Registration};
-use toile_driver_models::kinect2::{Content, Pattern};
+use toile_driver_kinect2::{Calibration, DecodeSettings, Decoder, Registration, color};
+use toile_driver_simulated::kinect2::{Content, Pattern};
 
 /// Processor time of this process.
 struct CpuTime;

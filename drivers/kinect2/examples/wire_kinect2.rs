@@ -18,11 +18,9 @@ use std::{
 };
 
 use toile_capture::{ColorImage, Frame, Source};
-use toile_driver_kinect2::{
-    Calibration, DecodeSettings, Decoder, Kinect2, Settings, color, registration::Registration,
-};
-use toile_driver_models::{
-    kinect2::{CameraModel, Content, Optics, Pattern},
+use toile_driver_kinect2::{Calibration, DecodeSettings, Decoder, Kinect2, Registration, Settings, color};
+use toile_driver_simulated::{
+    kinect2::{Content, Optics, Pattern, SimulatedCamera},
     proof::{self, Bench, Shown, same},
     vhci::{self, Plugged},
 };
@@ -39,7 +37,7 @@ fn main() -> Outcome<()> {
     match words[..] {
         ["write", file] => write(Path::new(file))?,
         ["serve", file] => {
-            // The kernel lets go when it is told to; what was being written then is of no use to it.
+            // The kernel lets go when it is asked to; what was being written then is of no use to it.
             if let Err(error) = Images::read(file)?.plug()?.wait() {
                 println!("server: {error}");
             }
@@ -103,7 +101,7 @@ impl Images {
     }
 
     fn plug(&self) -> io::Result<Plugged> {
-        vhci::plug(Arc::new(Mutex::new(CameraModel::new(self.clone()))))
+        vhci::plug(Arc::new(Mutex::new(SimulatedCamera::new(self.clone()))))
     }
 
     /// A frame beside what must arrive at its time.

@@ -4,12 +4,12 @@ use toile_geometry::camera::PinholeCamera;
 
 use crate::{
     Kinect2Error,
-    decode::{COLUMNS, ROWS},
+    size::{COLUMNS, ROWS},
 };
 
 /// Pixels of depth.
 const PIXELS: usize = COLUMNS * ROWS;
-/// Least bytes of the answers (libfreenect2 `protocol/response.h`: `P0TablesResponse`, `DepthCameraParamsResponse`,
+/// Smallest number of bytes of the answers (libfreenect2 `protocol/response.h`: `P0TablesResponse`, `DepthCameraParamsResponse`,
 /// `RgbCameraParamsResponse`).
 pub const P0_BYTES: usize = P0_HEADER + 3 * (2 * PIXELS + 4);
 /// See [`P0_BYTES`].
@@ -19,7 +19,7 @@ pub const COLOR_BYTES: usize = 1 + 25 * 4 + (28 * 23 * 5) * 4;
 /// Bytes before the tables; each table stands between two words of unknown meaning.
 const P0_HEADER: usize = 32;
 
-/// How colour sees what depth measures: numbers that the camera tells, under libfreenect2's names
+/// How colour sees what depth measures: numbers that the camera states, under libfreenect2's names
 /// (`ColorCameraParams`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ColorMap {
@@ -35,14 +35,14 @@ pub struct ColorMap {
     pub polynomials: [[f64; 10]; 2],
 }
 
-/// What the camera tells about itself.
+/// What the camera states about itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// The depth camera, not mirrored, pixel centres at integers.
     pub depth: PinholeCamera,
-    /// The colour camera's numbers, mirrored as they are told.
+    /// The colour camera's numbers, mirrored as they are stated.
     pub color: ColorMap,
-    /// Delay of each pixel's electronics at 80, 16 and 120 MHz, row by row, mirrored as told.
+    /// Delay of each pixel's electronics at 80, 16 and 120 MHz, row by row, mirrored as stated.
     pub p0: [Vec<u16>; 3],
 }
 
@@ -75,12 +75,12 @@ impl Calibration {
     }
 }
 
-fn within(what: &str, value: f64, least: f64, most: f64) -> Result<(), Kinect2Error> {
+fn within(what: &str, value: f64, min: f64, max: f64) -> Result<(), Kinect2Error> {
     // NaN is not within.
-    if (least..=most).contains(&value) {
+    if (min..=max).contains(&value) {
         return Ok(());
     }
-    Err(Kinect2Error::Calibration(format!("{what} is {value}, which is not between {least} and {most}")))
+    Err(Kinect2Error::Calibration(format!("{what} is {value}, which is not between {min} and {max}")))
 }
 
 /// Floats from `start` on.
@@ -92,7 +92,7 @@ fn floats<const N: usize>(bytes: &[u8], start: usize) -> Result<[f64; N], Kinect
 
 fn depth_camera(bytes: &[u8]) -> Result<PinholeCamera, Kinect2Error> {
     let [fx, fy, _, cx, cy, k1, k2, p1, p2, k3] = floats(bytes, 0)?;
-    // Told for a mirrored image with pixel centres at halves (libfreenect2 `IrCameraTables`): mirroring turns the second
+    // Stated for a mirrored image with pixel centres at halves (libfreenect2 `IrCameraTables`): mirroring turns the second
     // tangential coefficient round.
     let (cx, cy) = (COLUMNS as f64 - cx - 0.5, cy - 0.5);
     let ideal = PinholeCamera::ideal(COLUMNS as u32, ROWS as u32, fx, fy, cx, cy);
@@ -101,13 +101,13 @@ fn depth_camera(bytes: &[u8]) -> Result<PinholeCamera, Kinect2Error> {
 
 fn color_map(bytes: &[u8]) -> Result<ColorMap, Kinect2Error> {
     // One byte before them: the number of the table.
-    let told: [f64; 25] = floats(bytes, 1)?;
-    let polynomial = |start: usize| std::array::from_fn(|i| told[start + i]);
+    let stated: [f64; 25] = floats(bytes, 1)?;
+    let polynomial = |start: usize| std::array::from_fn(|i| stated[start + i]);
     Ok(ColorMap {
-        focal: told[0],
-        center: [told[1], told[2]],
-        shift_d: told[3],
-        shift_m: told[4],
+        focal: stated[0],
+        center: [stated[1], stated[2]],
+        shift_d: stated[3],
+        shift_m: stated[4],
         polynomials: [polynomial(5), polynomial(15)],
     })
 }
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_where_they_are_told() {
+    fn numbers_are_where_they_are_stated() {
         let [depth, color, p0] = answers();
         let read = Calibration::parse(&depth, &color, &p0).unwrap();
         assert!((read.depth.cx - (511.5 - 260.1)).abs() < 1e-4 && (read.depth.cy - 204.8).abs() < 1e-4);

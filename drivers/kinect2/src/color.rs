@@ -13,7 +13,7 @@ pub const COLOR_ROWS: usize = 1080;
 /// Pixels of a JPEG, row by row, mirrored as they are sent.
 ///
 /// # Errors
-/// [`Kinect2Error::Color`] where it is none, or of another size.
+/// [`Kinect2Error::Color`] where it is not a JPEG, or of another size.
 pub fn decode(jpeg: &[u8]) -> Result<Vec<[u8; 3]>, Kinect2Error> {
     let wrong = |error: image::ImageError| Kinect2Error::Color(error.to_string());
     let decoder = JpegDecoder::new(std::io::Cursor::new(jpeg)).map_err(wrong)?;
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_image_of_the_camera_is_refused() {
+    fn other_images_than_the_cameras_are_refused() {
         assert!(decode(&[0xff, 0xd8, 0xff, 0xd9]).is_err());
         let mut small = Vec::new();
         image::codecs::jpeg::JpegEncoder::new(&mut small)

@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// No image is longer (libfreenect2 `rgb_packet_stream_parser.cpp` gives as much room).
-const MOST_BYTES: usize = 2 << 20;
+const MAX_BYTES: usize = 2 << 20;
 
 /// A colour image as the camera sent it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl ColorStream {
             self.losses.bad += 1;
             return None;
         }
-        if self.bytes.len() + transfer.len() > MOST_BYTES {
+        if self.bytes.len() + transfer.len() > MAX_BYTES {
             self.losses.bad += 1;
             self.tear();
             return None;
@@ -139,7 +139,7 @@ mod tests {
         let mut stream = ColorStream::default();
         stream.push(&color(0, &jpeg(0), 0, 0)[..100]);
         (0..5000).for_each(|_| assert!(stream.push(&[1; ROOM]).is_none()));
-        assert!(stream.losses().torn_frames == 1 && stream.bytes.len() <= MOST_BYTES);
+        assert!(stream.losses().torn_frames == 1 && stream.bytes.len() <= MAX_BYTES);
         assert!(stream.push(&color(1, &jpeg(1), 0, 0)).is_some());
     }
 

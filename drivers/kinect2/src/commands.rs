@@ -28,7 +28,7 @@ const PAGE_DEPTH: u32 = 3;
 const PAGE_COLOR: u32 = 4;
 /// Room that the camera expects an answer with a page of calibration to have.
 const PAGE_ROOM: usize = 0x1c_0000;
-/// The status that tells in its lowest bit that the camera is ready, and the pause between looks at it.
+/// The status whose lowest bit says that the camera is ready, and the pause between looks at it.
 const READY: u32 = 0x09_0000;
 const PAUSE: Duration = Duration::from_millis(20);
 /// Mode of streaming, and none.
@@ -82,8 +82,8 @@ impl Commands {
         let wrong = |command, what: &str| Kinect2Error::Answer { command, reason: format!("{what} cannot be read") };
         let versions = self.ask(device, FIRMWARE, &[], 0x200, 64)?;
         let firmware = firmware(&versions).ok_or_else(|| wrong(FIRMWARE, "the firmware's version"))?;
-        let told = self.ask(device, DATA_PAGE, &[PAGE_SERIAL], 0x80, 2)?;
-        let serial = serial(&told).ok_or_else(|| wrong(DATA_PAGE, "the serial number"))?;
+        let stated = self.ask(device, DATA_PAGE, &[PAGE_SERIAL], 0x80, 2)?;
+        let serial = serial(&stated).ok_or_else(|| wrong(DATA_PAGE, "the serial number"))?;
         Ok(Identity { serial, firmware })
     }
 
@@ -97,8 +97,8 @@ impl Commands {
 
     /// Makes the camera ready (at most `ready_limit`) and switches its streams on (libfreenect2 `startStreams`).
     pub(crate) fn start(&mut self, device: &mut dyn UsbDevice, ready_limit: Duration) -> Result<(), Kinect2Error> {
-        self.tell(device, MODE, &MODE_STREAMING)?;
-        self.tell(device, MODE, &MODE_OFF)?;
+        self.send(device, MODE, &MODE_STREAMING)?;
+        self.send(device, MODE, &MODE_OFF)?;
         let start = Instant::now();
         while self.ask(device, STATUS, &[READY], 4, 4)?[0] & 1 == 0 {
             if start.elapsed() >= ready_limit {
@@ -107,33 +107,33 @@ impl Commands {
             }
             thread::sleep(PAUSE);
         }
-        self.tell(device, INIT_STREAMS, &[])?;
+        self.send(device, INIT_STREAMS, &[])?;
         device.set_alternate(DEPTH_INTERFACE, 1)?;
         self.ask(device, STATUS, &[READY], 4, 4)?;
-        self.tell(device, STREAMING, &[1])
+        self.send(device, STREAMING, &[1])
     }
 
     /// Switches the streams off and on again.
     pub(crate) fn restart(&mut self, device: &mut dyn UsbDevice) -> Result<(), Kinect2Error> {
-        self.tell(device, STREAMING, &[0])?;
-        self.tell(device, STREAMING, &[1])
+        self.send(device, STREAMING, &[0])?;
+        self.send(device, STREAMING, &[1])
     }
 
     /// Switches the streams off and puts the camera to sleep (libfreenect2 `stop`).
     pub(crate) fn stop(&mut self, device: &mut dyn UsbDevice) -> Result<(), Kinect2Error> {
         device.set_alternate(DEPTH_INTERFACE, 0)?;
         let off_and_on = [&MODE_ON[..], &MODE_OFF, &MODE_ON, &MODE_OFF];
-        self.tell(device, MODE, &MODE_STREAMING)?;
-        self.tell(device, MODE, &MODE_OFF)?;
-        self.tell(device, STOP, &[])?;
-        self.tell(device, STREAMING, &[0])?;
-        off_and_on.into_iter().try_for_each(|mode| self.tell(device, MODE, mode))?;
+        self.send(device, MODE, &MODE_STREAMING)?;
+        self.send(device, MODE, &MODE_OFF)?;
+        self.send(device, STOP, &[])?;
+        self.send(device, STREAMING, &[0])?;
+        off_and_on.into_iter().try_for_each(|mode| self.send(device, MODE, mode))?;
         device.control_out(SUSPEND, &[], self.limit)?;
         Ok(())
     }
 
     /// A command without an answer.
-    fn tell(&mut self, device: &mut dyn UsbDevice, code: u32, parameters: &[u32]) -> Result<(), Kinect2Error> {
+    fn send(&mut self, device: &mut dyn UsbDevice, code: u32, parameters: &[u32]) -> Result<(), Kinect2Error> {
         self.ask(device, code, parameters, 0, 0).map(drop)
     }
 
@@ -144,7 +144,7 @@ impl Commands {
         code: u32,
         parameters: &[u32],
         room: usize,
-        least: usize,
+        min: usize,
     ) -> Result<Vec<u8>, Kinect2Error> {
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
@@ -157,8 +157,8 @@ impl Commands {
             if is_completion(&answer) {
                 return Err(wrong("it was completed without an answer".into()));
             }
-            if length < least {
-                return Err(wrong(format!("the answer has {length} bytes instead of {least}")));
+            if length < min {
+                return Err(wrong(format!("the answer has {length} bytes instead of {min}")));
             }
         }
         let mut end = [0; COMPLETION_BYTES];

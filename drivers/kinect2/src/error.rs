@@ -11,12 +11,6 @@ pub enum Kinect2Error {
     /// It is plugged into a slower port.
     #[error("Kinect v2: it is on a USB 2 link but streams only over USB 3: use a blue port and its own cable")]
     SlowLink,
-    /// The kernel has no memory for so many transfers.
-    #[error(
-        "Kinect v2: the kernel gives no memory for its transfers ({0}); allow more: \
-         echo 64 | sudo tee /sys/module/usbcore/parameters/usbfs_memory_mb"
-    )]
-    Memory(TransportError),
     /// The camera answered a command with something else.
     #[error(
         "Kinect v2: command {command:#04x}: {reason}; unplug the Kinect from power for ten seconds and plug it in again"

@@ -3,11 +3,11 @@
 //! The way of a frame, a file each:
 //!
 //! 1. [`protocol`]: bytes to commands, answers, depth images and colour images, pure;
-//! 2. [`depth_stream`], [`color_stream`]: what the bus brings to whole packets; what is lost is counted;
-//! 3. [`toile_capture::pairing`]: depth and colour of one time to one frame;
-//! 4. [`decode`]: ten images of measurements to depth in millimetres, pure; [`color`]: the JPEG to pixels;
-//! 5. [`calibration`]: the device's own numbers; [`registration`]: colour as depth sees it;
-//! 6. [`device`]: [`Kinect2`], the [`toile_capture::Source`] over it all, as [`settings`] say; [`health`]: how it went.
+//! 2. [`DepthStream`], [`ColorStream`]: what the bus brings to whole packets; what is lost is counted;
+//! 3. `streams`: transfers to frames, depth and colour of one time paired ([`toile_capture::pairing`]);
+//! 4. [`Decoder`]: ten images of measurements to depth in millimetres, pure; [`color`]: the JPEG to pixels;
+//! 5. [`Calibration`]: the device's own calibration; [`Registration`]: colour as depth sees it;
+//! 6. [`Kinect2`]: the [`toile_capture::Source`] over it all, as [`Settings`] say; [`Health`]: how well it went.
 //!
 //! The sensor sees everything mirrored; what this crate gives is not. Protocol facts were learnt from libfreenect2
 //! (<https://github.com/OpenKinect/libfreenect2>); each constant names its place.
@@ -16,9 +16,9 @@
 //! use toile_capture::Source;
 //! use toile_driver_kinect2::{Kinect2, Settings};
 //! # use std::sync::{Arc, Mutex};
-//! # use toile_driver_models::kinect2::{CameraModel, Pattern};
-//! # let bus = toile_driver_transport::twin::VirtualBus::default();
-//! # bus.plug(Arc::new(Mutex::new(CameraModel::new(Pattern::default()))));
+//! # use toile_driver_simulated::kinect2::{SimulatedCamera, Pattern};
+//! # let bus = toile_driver_transport::simulated::SimulatedBus::default();
+//! # bus.plug(Arc::new(Mutex::new(SimulatedCamera::new(Pattern::default()))));
 //! # // On a machine with a Kinect: let bus = toile_driver_transport::libusb::LibusbBus::new()?;
 //! let mut kinect = Kinect2::open(&bus, None, Settings::default())?;
 //! let frame = kinect.next_frame()?.ok_or("it streams")?;
@@ -26,22 +26,30 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod calibration;
+mod calibration;
 pub mod color;
-pub mod color_stream;
+mod color_stream;
 mod commands;
-pub mod decode;
-pub mod depth_stream;
-pub mod device;
-pub mod error;
-pub mod health;
+mod decode;
+mod depth_stream;
+mod device;
+mod error;
+mod find;
+mod health;
 pub mod protocol;
-pub mod registration;
-pub mod settings;
+mod registration;
+mod rig;
+mod settings;
+mod size;
+mod streams;
 
 pub use calibration::Calibration;
+pub use color_stream::ColorStream;
 pub use decode::{DecodeSettings, Decoded, Decoder};
-pub use device::{Kinect2, list};
+pub use depth_stream::DepthStream;
+pub use device::Kinect2;
 pub use error::Kinect2Error;
+pub use find::list;
 pub use health::{Health, Losses};
+pub use registration::Registration;
 pub use settings::{ColorMode, Settings};

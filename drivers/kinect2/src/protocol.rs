@@ -14,7 +14,7 @@ pub const DEPTH_PACKET_ROOM: usize = 0x8400;
 
 /// Begins every command (libfreenect2 `protocol/command.h`, `MagicNumber`).
 const COMMAND_MAGIC: u32 = 0x0602_2009;
-/// Begins every completion (libfreenect2 `protocol/command_transaction.h`), which has so many bytes.
+/// Begins every completion (libfreenect2 `protocol/command_transaction.h`), which has this many bytes.
 const COMPLETION_MAGIC: u32 = 0x0a6f_e000;
 /// Length of the answer that ends a command.
 pub const COMPLETION_BYTES: usize = 16;

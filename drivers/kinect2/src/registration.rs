@@ -3,7 +3,7 @@
 //! The device's rule (libfreenect2 `src/registration.c`, `depth_to_color` and `apply`; learnt in its issue #41): with the
 //! depth pixel's distance from the centre in hundreds of pixels, without the lens' distortion, two cubic polynomials give
 //! the column at distance `shift_d` and the row; the column then moves by the parallax between `shift_d` and the pixel's
-//! own depth. All of it is told for mirrored images; here images are not mirrored.
+//! own depth. All of it is stated for mirrored images; here images are not mirrored.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use toile_capture::RgbImage;
@@ -12,18 +12,18 @@ use toile_geometry::{Rigid, camera::PinholeCamera};
 use crate::{
     Calibration,
     color::{COLOR_COLUMNS, COLOR_ROWS},
-    decode::{COLUMNS, ROWS},
+    size::{COLUMNS, ROWS},
 };
 
 /// Units of the polynomials (libfreenect2 `depth_q`, `color_q`).
 const DEPTH_UNIT: f64 = 0.01;
 const COLOR_UNIT: f64 = 0.002199;
-/// What is nearer to the colour camera is kept in cells of so many of its columns and rows: about a depth pixel.
+/// What is nearer to the colour camera is kept in cells of this many of its columns and rows: about a depth pixel.
 const CELL: usize = 3;
 const CELLS: [usize; 2] = [COLOR_COLUMNS.div_ceil(CELL), COLOR_ROWS.div_ceil(CELL)];
 /// A pixel is hidden where something is nearer by this share of its depth; pixels nearer together are of one surface.
 const BEHIND: f32 = 0.03;
-/// The colour of a hidden pixel is looked for so many pixels aside.
+/// The colour of a hidden pixel is looked for this many pixels aside.
 const ASIDE: usize = 24;
 /// Pixels without depth get the colour that they would have at this distance, millimetres.
 const NO_DEPTH_MM: f32 = 2000.0;
@@ -44,7 +44,7 @@ impl Registration {
         let (depth, color) = (calibration.depth, &calibration.color);
         let far = depth.rays().into_iter().map(|ray| {
             let [x, y] = ray.map(f64::from);
-            // As if without distortion, mirrored, from the told centre; pixel centres at integers.
+            // As if without distortion, mirrored, from the stated centre; pixel centres at integers.
             let from_center = [-x * depth.fx - 0.5, y * depth.fy - 0.5].map(|d| d * DEPTH_UNIT);
             let [wx, wy] = color.polynomials.each_ref().map(|p| polynomial(p, from_center));
             let column = wx / COLOR_UNIT - color.focal * color.shift_m / color.shift_d + color.center[0];
@@ -81,7 +81,7 @@ impl Registration {
         RgbImage { width: COLUMNS as u32, height: ROWS as u32, pixels }
     }
 
-    /// The least depth in each cell of the colour image, millimetres: every pixel covers the cells that it touches.
+    /// The smallest depth in each cell of the colour image, millimetres: every pixel covers the cells that it touches.
     fn nearest(&self, depth_mm: &[f32]) -> Vec<f32> {
         let mut nearest = vec![f32::INFINITY; CELLS[0] * CELLS[1]];
         // Half a depth pixel, and as far as pixels are mixed.

@@ -7,14 +7,14 @@ use std::sync::{Arc, Mutex};
 
 use common::{PATTERN, depth_fault, plugged, settings};
 use toile_driver_kinect2::{ColorMode, DecodeSettings, Kinect2, Settings};
-use toile_driver_models::{
-    kinect2::{CameraModel, Optics, Pattern, StreamFault},
+use toile_driver_simulated::{
+    kinect2::{Optics, Pattern, SimulatedCamera, StreamFault},
     trials,
 };
 
 #[test]
 fn a_recorded_take_replayed_and_recorded_again_is_the_same() {
-    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let (bus, ..) = plugged(SimulatedCamera::new(PATTERN.clone()));
     let mut kinect = Kinect2::open(&bus, None, Settings { color: ColorMode::Registered, ..settings() }).unwrap();
     trials::recorded_again_is_the_same(tempfile::tempdir().unwrap().path(), &mut kinect, 12);
 }
@@ -28,15 +28,15 @@ fn a_hundred_unplugs_and_replugs_end_cleanly_and_nothing_is_kept() {
     let pattern = Pattern::of(Optics::of_synthetic_sensor());
     trials::unplugged_a_hundred_times(folder.path(), 120_000, |cycle, bus| {
         let fault = depth_fault(1 + cycle % 2, 17 * cycle as usize % 90, StreamFault::Unplug);
-        let model = Arc::new(Mutex::new(CameraModel::new(pattern.clone()).with_faults([fault])));
+        let model = Arc::new(Mutex::new(SimulatedCamera::new(pattern.clone()).with_faults([fault])));
         bus.plug(model.clone());
         (model, Box::new(Kinect2::open(bus, None, settings.clone()).unwrap()))
     });
 }
 
-/// So many frames leave memory as it was; a leak of a tenth of a packet a frame would be 0.3 MB each.
+/// This many frames leave memory as it was; a leak of a tenth of a packet a frame would be 0.3 MB each.
 fn memory_stays_flat_over(frames: u64) {
-    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let (bus, ..) = plugged(SimulatedCamera::new(PATTERN.clone()));
     let decode = DecodeSettings { smooth: false, drop_edges: false, ..DecodeSettings::default() };
     let plain = Settings { color: ColorMode::Off, decode, ..settings() };
     let mut kinect = Kinect2::open(&bus, None, plain).unwrap();

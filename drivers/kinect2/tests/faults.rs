@@ -8,8 +8,8 @@ use std::time::Instant;
 use common::{PATTERN, color_fault, depth_fault, faulty, has_color_of, has_depth_of, plugged, settings};
 use toile_capture::Source;
 use toile_driver_kinect2::{Health, Kinect2, Settings};
-use toile_driver_models::{
-    kinect2::{CameraModel, CommandFault, Content, Fault, StreamFault},
+use toile_driver_simulated::{
+    kinect2::{CommandFault, Content, Fault, SimulatedCamera, StreamFault},
     trials::take,
 };
 
@@ -76,7 +76,7 @@ fn a_torn_depth_frame_is_dropped_and_the_next_one_is_whole() {
 }
 
 #[test]
-fn late_packets_are_no_loss() {
+fn late_packets_are_not_a_loss() {
     let mut kinect = faulty(&[depth_fault(1, 40, StreamFault::Late(5)), color_fault(2, 0, StreamFault::Late(60))]);
     let (frames, _) = take(&mut kinect, 5);
     assert!(frames.iter().zip(0..).all(|(f, k)| has_depth_of(f, k) && has_color_of(f, k) && f.lost_before == 0));
@@ -124,9 +124,9 @@ fn a_lost_pair_is_a_lost_frame() {
     let lost = StreamFault::Lost(1);
     let mut kinect = faulty(&[color_fault(1, 0, lost), depth_fault(3, 9, lost), color_fault(3, 0, lost)]);
     let (frames, _) = take(&mut kinect, 4);
-    let told = frames.iter().map(|f| (f.device_frame, f.lost_before, f.depth.is_some(), f.color.is_some()));
-    let told: Vec<_> = told.collect();
-    assert_eq!(told, [(0, 0, true, true), (1, 0, true, false), (2, 0, true, true), (4, 1, true, true)]);
+    let stated = frames.iter().map(|f| (f.device_frame, f.lost_before, f.depth.is_some(), f.color.is_some()));
+    let stated: Vec<_> = stated.collect();
+    assert_eq!(stated, [(0, 0, true, true), (1, 0, true, false), (2, 0, true, true), (4, 1, true, true)]);
     assert_eq!((kinect.health().lost_frames, kinect.health().alone), (1, [1, 0]));
 }
 
@@ -139,7 +139,7 @@ fn a_stalled_colour_stream_ends_the_take_in_words() {
 }
 
 #[test]
-fn a_silent_stream_is_woken_once_and_then_told() {
+fn a_silent_stream_is_restarted_once_and_then_reported() {
     let mut kinect = faulty(&[depth_fault(2, 40, StreamFault::Silent), color_fault(2, 0, StreamFault::Silent)]);
     let (frames, error) = take(&mut kinect, 6);
     assert!(error.is_none(), "{error:?}");
@@ -161,7 +161,7 @@ fn nonsense_numbers_lose_nothing_and_nonsense_times_their_picture_only() {
     for (what, keeps) in [
         (StreamFault::Sequence(1_000_000), true),
         (StreamFault::Sequence(60), true),
-        (StreamFault::Ticks(160_000), false),
+        (StreamFault::Time(160_000), false),
     ] {
         spoils_frame_2(depth_fault(2, 0, what), (keeps, true));
     }
@@ -191,7 +191,7 @@ fn firmware_that_answers_nonsense_is_refused_in_words() {
         (CommandFault::NonsenseCalibration, "focal length is NaN"),
         (CommandFault::Slow(u32::MAX), "waiting for the camera to be ready: no answer in 60 ms"),
     ] {
-        let mut model = CameraModel::new(PATTERN.clone());
+        let mut model = SimulatedCamera::new(PATTERN.clone());
         model.set_command_fault(Some(fault));
         let (bus, ..) = plugged(model);
         let start = Instant::now();
@@ -203,7 +203,7 @@ fn firmware_that_answers_nonsense_is_refused_in_words() {
 
 #[test]
 fn a_camera_that_is_slow_to_be_ready_is_waited_for() {
-    let mut model = CameraModel::new(PATTERN.clone());
+    let mut model = SimulatedCamera::new(PATTERN.clone());
     model.set_command_fault(Some(CommandFault::Slow(2)));
     let (bus, ..) = plugged(model);
     // As patient as the driver is by itself: the machine may be busy.

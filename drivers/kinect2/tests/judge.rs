@@ -30,8 +30,8 @@ fn what_is_dropped_is_a_setting() {
     let (_, calibration) = calibration(optics);
     let count = |settings: DecodeSettings| {
         let decoded = Decoder::new(&calibration, settings).decode(&packet).unwrap();
-        let (least, most) = (1000.0 * settings.min_depth, 1000.0 * settings.max_depth);
-        assert!(decoded.depth_mm.iter().all(|&mm| mm == 0.0 || (least..=most).contains(&mm)));
+        let (min, max) = (1000.0 * settings.min_depth, 1000.0 * settings.max_depth);
+        assert!(decoded.depth_mm.iter().all(|&mm| mm == 0.0 || (min..=max).contains(&mm)));
         decoded.depth_mm.iter().filter(|mm| **mm > 0.0).count()
     };
     let all = DecodeSettings::default();

@@ -9,16 +9,16 @@ use common::{
     settings,
 };
 use toile_capture::{ClockDomain, ColorImage, Source};
-use toile_driver_kinect2::{ColorMode, Kinect2, Settings, registration::Registration};
-use toile_driver_models::{
-    kinect2::{CameraModel, Optics, Pattern},
+use toile_driver_kinect2::{ColorMode, Kinect2, Registration, Settings};
+use toile_driver_simulated::{
+    kinect2::{Optics, Pattern, SimulatedCamera},
     trials::take,
 };
 use toile_synthetic::sensor::TrueImage;
 
 #[test]
 fn a_hundred_frames_are_identical_and_none_is_lost() {
-    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let (bus, ..) = plugged(SimulatedCamera::new(PATTERN.clone()));
     let mut kinect = Kinect2::open(&bus, None, settings()).unwrap();
     for k in 0..100 {
         let frame = kinect.next_frame().unwrap().unwrap();
@@ -33,7 +33,7 @@ fn a_hundred_frames_are_identical_and_none_is_lost() {
 
 #[test]
 fn the_sensor_says_who_it_is_and_the_camera_is_left_switched_off() {
-    let (bus, _, model) = plugged(CameraModel::new(PATTERN.clone()).with_serial("B7"));
+    let (bus, _, model) = plugged(SimulatedCamera::new(PATTERN.clone()).with_serial("B7"));
     let kinect = Kinect2::open(&bus, Some("B7"), settings()).unwrap();
     let identity = kinect.rig().sensors[0].identity.clone();
     assert_eq!((identity.serial.as_str(), identity.firmware.as_str()), ("B7", "4.3.3913.0"));
@@ -46,8 +46,8 @@ fn the_sensor_says_who_it_is_and_the_camera_is_left_switched_off() {
 }
 
 #[test]
-fn a_slow_link_is_told_before_anything_is_asked() {
-    let model = CameraModel::new(PATTERN.clone()).at_speed(toile_driver_transport::LinkSpeed::High);
+fn a_slow_link_is_reported_before_anything_is_asked() {
+    let model = SimulatedCamera::new(PATTERN.clone()).at_speed(toile_driver_transport::LinkSpeed::High);
     let (bus, ..) = plugged(model);
     let error = Kinect2::open(&bus, None, settings()).err().unwrap().to_string();
     assert!(error.contains("USB 2") && error.contains("blue port"), "{error}");
@@ -55,7 +55,7 @@ fn a_slow_link_is_told_before_anything_is_asked() {
 
 #[test]
 fn depth_alone_where_no_colour_is_wanted() {
-    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let (bus, ..) = plugged(SimulatedCamera::new(PATTERN.clone()));
     let mut kinect = Kinect2::open(&bus, None, Settings { color: ColorMode::Off, ..settings() }).unwrap();
     assert!(kinect.rig().sensors[0].color.is_none());
     let (frames, _) = take(&mut kinect, 4);
@@ -75,8 +75,8 @@ fn registration_is_within_half_a_pixel_of_the_optics() {
             for mm in [500_u16, 800, 1200, 2600, 4500] {
                 let z = f64::from(mm) * 1e-3;
                 let truth = optics.color_pixel(u as f64, v as f64, z).unwrap();
-                let told = registration.color_pixel(u, v, f32::from(mm)).map(f64::from);
-                worst[0] = worst[0].max((told[0] - truth[0]).hypot(told[1] - truth[1]));
+                let stated = registration.color_pixel(u, v, f32::from(mm)).map(f64::from);
+                worst[0] = worst[0].max((stated[0] - truth[0]).hypot(stated[1] - truth[1]));
                 // The colour camera of the rig says the same as the tables.
                 let point = color_from_depth * optics.depth.unproject(u as f64, v as f64, z);
                 let pixel = camera.project(&point).unwrap();
@@ -90,7 +90,7 @@ fn registration_is_within_half_a_pixel_of_the_optics() {
 /// Colours of the pattern say where they are: red the column, green the row.
 #[test]
 fn registered_colours_come_from_the_place_that_the_optics_say() {
-    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()));
+    let (bus, ..) = plugged(SimulatedCamera::new(PATTERN.clone()));
     let mut kinect = Kinect2::open(&bus, None, Settings { color: ColorMode::Registered, ..settings() }).unwrap();
     let sensor = kinect.rig().sensors[0].clone();
     assert_eq!(sensor.color, Some(sensor.depth));
@@ -111,7 +111,7 @@ fn registered_colours_come_from_the_place_that_the_optics_say() {
 }
 
 /// A plate at one metre before a wall at two and a half; what the colour camera sees of the plate is red, all else green.
-/// The colour camera stands 5 cm aside: a strip of the wall beside the plate is hidden from it, and is no red.
+/// The colour camera stands 5 cm aside: a strip of the wall beside the plate is hidden from it, and is not red.
 #[test]
 fn what_is_hidden_from_the_colour_camera_does_not_take_the_colour_of_what_hides_it() {
     let registration = Registration::new(&calibration(Optics::default()).1);
@@ -138,7 +138,7 @@ fn what_is_hidden_from_the_colour_camera_does_not_take_the_colour_of_what_hides_
 fn a_rendered_person_is_measured() {
     let content = person_content(6.0);
     let (truth, colors) = (content.truth(0), content.color(0));
-    let (bus, ..) = plugged(CameraModel::new(content));
+    let (bus, ..) = plugged(SimulatedCamera::new(content));
     let mut kinect = Kinect2::open(&bus, None, settings()).unwrap();
     let frame = kinect.next_frame().unwrap().unwrap();
     let (depth, Some(ColorImage::Rgb(image))) = (frame.depth.unwrap(), frame.color) else { panic!("no colour") };

@@ -17,13 +17,13 @@ use std::{
 };
 
 use toile_capture::{ColorImage, Frame, Source};
-use toile_driver_models::{
+use toile_driver_realsense::{Realsense, Settings, list};
+use toile_driver_simulated::{
     d435::{self, Content, Pattern},
     proof::{self, Bench, Shown, same},
     uvc::Wire,
     vhci::{self, Plugged},
 };
-use toile_driver_realsense::{Realsense, Settings, list};
 use toile_driver_transport::video::kernel::KernelVideo;
 
 const SIZE: (u16, u16) = (640, 480);
@@ -35,7 +35,7 @@ fn main() -> Outcome<()> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
         ["serve", name] => {
-            // The kernel lets go when it is told to; what was being written then is of no use to it.
+            // The kernel lets go when it is asked to; what was being written then is of no use to it.
             if let Err(error) = plug(wire(name)?)?.wait() {
                 println!("server: {error}");
             }

@@ -81,8 +81,8 @@ impl Calibration {
             Some(place) => (place, [1.0; 2]),
             None => (0, [f64::from(width) / 1920.0, f64::from(height) / 1080.0]),
         };
-        let told: [f64; 4] = std::array::from_fn(|i| float(&self.coefficients, RECTIFIED_AT + 16 * place + 4 * i));
-        let [fx, fy, cx, cy] = [told[0] * scale[0], told[1] * scale[1], told[2] * scale[0], told[3] * scale[1]];
+        let stated: [f64; 4] = std::array::from_fn(|i| float(&self.coefficients, RECTIFIED_AT + 16 * place + 4 * i));
+        let [fx, fy, cx, cy] = [stated[0] * scale[0], stated[1] * scale[1], stated[2] * scale[0], stated[3] * scale[1]];
         checked(PinholeCamera::ideal(width, height, fx, fy, cx, cy), "depth")
     }
 
@@ -91,7 +91,7 @@ impl Calibration {
     /// # Errors
     /// [`RealsenseError::Calibration`] where it is impossible.
     pub fn baseline(&self) -> Result<f64, RealsenseError> {
-        // Told in millimetres, and below zero.
+        // Stated in millimetres, and below zero.
         let metres = float(&self.coefficients, BASELINE_AT).abs() * 1e-3;
         if (1e-3..1.0).contains(&metres) {
             return Ok(metres);
@@ -107,8 +107,8 @@ impl Calibration {
         let Some(table) = &self.color else { return Ok(None) };
         // Focal lengths and centre for an image from -1 to 1 in the calibrated size, whose longer side is kept.
         let [fx, fy, cx, cy] = [0, 4, 2, 5].map(|i| float(table, 4 * i));
-        let told = [short(table, SIZE_AT), short(table, SIZE_AT + 2)];
-        let calibrated = if told.contains(&0.0) { 9.0 / 16.0 } else { told[1] / told[0] };
+        let stated = [short(table, SIZE_AT), short(table, SIZE_AT + 2)];
+        let calibrated = if stated.contains(&0.0) { 9.0 / 16.0 } else { stated[1] / stated[0] };
         let (w, h) = (f64::from(width), f64::from(height));
         let ratio = h / w / calibrated;
         let (across, down) = if ratio < 1.0 { (1.0, 1.0 / ratio) } else { (ratio, 1.0) };
@@ -125,34 +125,34 @@ impl Calibration {
     /// Where the depth camera stands in the colour camera's frame; identity where there is no colour camera.
     ///
     /// # Errors
-    /// [`RealsenseError::Calibration`] where the rotation is none.
+    /// [`RealsenseError::Calibration`] where its rotation is not one.
     pub fn color_from_depth(&self) -> Result<Rigid, RealsenseError> {
         let Some(table) = &self.color else { return Ok(Rigid::identity()) };
-        // Told the other way round (`get_d400_color_stream_extrinsic`): columns one after another; millimetres, negated.
-        let told = Matrix3::from_iterator((0..9).map(|i| float(table, ROTATION_AT + 4 * i)));
+        // Stated the other way round (`get_d400_color_stream_extrinsic`): columns one after another; millimetres, negated.
+        let stated = Matrix3::from_iterator((0..9).map(|i| float(table, ROTATION_AT + 4 * i)));
         let place = Vector3::from_iterator((0..3).map(|i| float(table, TRANSLATION_AT + 4 * i) * -1e-3));
-        let is_rotation = (told * told.transpose() - Matrix3::identity()).abs().max() < MOST_SKEW
-            && told.determinant() > 0.0
+        let is_rotation = (stated * stated.transpose() - Matrix3::identity()).abs().max() < MAX_SKEW
+            && stated.determinant() > 0.0
             && place.norm() < 1.0;
         if !is_rotation {
             return Err(RealsenseError::Calibration("the colour camera's place is impossible".into()));
         }
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&told));
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&stated));
         Ok(Rigid::from_parts(Translation3::from(place), rotation).inverse())
     }
 }
 
-/// A rotation told in single precision is orthogonal to this much.
-const MOST_SKEW: f64 = 1e-3;
+/// A rotation stated in single precision is orthogonal to this much.
+const MAX_SKEW: f64 = 1e-3;
 
 /// The body of a table whose header and checksum are right.
 fn table(bytes: &[u8], kind: u16, length: usize) -> Result<Vec<u8>, String> {
     let Some((header, rest)) = bytes.split_at_checked(HEADER) else {
         return Err(format!("table {kind} has {} bytes", bytes.len()));
     };
-    let told = u16::from_le_bytes([header[2], header[3]]);
-    if told != kind {
-        return Err(format!("table {told} came where table {kind} was asked for"));
+    let stated = u16::from_le_bytes([header[2], header[3]]);
+    if stated != kind {
+        return Err(format!("table {stated} came where table {kind} was asked for"));
     }
     let size = u32::from_le_bytes([header[4], header[5], header[6], header[7]]) as usize;
     let Some(body) = rest.get(..size).filter(|body| body.len() >= length) else {

@@ -35,7 +35,7 @@ pub struct Camera {
     pub address: (u8, u8),
     /// Speed of its link.
     pub speed: LinkSpeed,
-    /// Serial number of the USB device (the camera's own is told by [`crate::Realsense`]).
+    /// Serial number of the USB device (the camera's own is stated by [`crate::Realsense`]).
     pub serial: String,
     /// Depth (Z16).
     pub depth: Option<Nodes>,
@@ -53,7 +53,7 @@ impl Camera {
 }
 
 /// The cameras that are plugged in, in the order of their first nodes. Nodes that cannot be opened are left out
-/// ([`refusal`] tells why).
+/// ([`refusal`] says why).
 ///
 /// # Errors
 /// [`RealsenseError::Transport`] where nodes cannot be listed at all.

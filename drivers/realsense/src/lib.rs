@@ -2,12 +2,13 @@
 //!
 //! The way of a frame, a file each:
 //!
-//! 1. [`find`]: cameras by their USB device, and their nodes: depth, infrared, colour, and the metadata node of each;
-//! 2. [`monitor`]: commands to the firmware over the extension unit, pure; [`calibration`]: its tables to cameras;
-//! 3. [`controls`]: laser, exposure, preset;
-//! 4. [`metadata`]: payload headers to device time and frame number, pure; [`stream`]: pictures with their metadata;
-//! 5. [`decode`]: buffers to images, pure; [`toile_capture::pairing`]: depth and colour of one time to one frame;
-//! 6. [`device`]: [`Realsense`], the [`toile_capture::Source`] over it all, as [`settings`] say; [`health`]: how it went.
+//! 1. [`list`]: cameras by their USB device, and their nodes: depth, infrared, colour, and the metadata node of each;
+//! 2. [`monitor`]: commands to the firmware over the extension unit, pure; [`Calibration`]: its tables to cameras;
+//! 3. [`Controls`]: laser, exposure, preset;
+//! 4. [`metadata`]: payload headers to device time and frame number, pure; `stream`: pictures with their metadata;
+//! 5. [`toile_capture::pixels`], [`infrared_pair`]: buffers to images, pure; `streams`: depth and colour of one time to one
+//!    frame ([`toile_capture::pairing`]);
+//! 6. [`Realsense`]: the [`toile_capture::Source`] over it all, as [`Settings`] say; [`Health`]: how well it went.
 //!
 //! Facts were learnt from librealsense (<https://github.com/IntelRealSense/librealsense>) and Linux' `uvcvideo`; each
 //! constant names its place.
@@ -16,11 +17,11 @@
 //! use toile_capture::Source;
 //! use toile_driver_realsense::{Realsense, Settings};
 //! # use std::sync::{Arc, Mutex};
-//! # use toile_driver_models::{d435, uvc::Wire};
-//! # use toile_driver_transport::{twin::VirtualBus, video::twin::VirtualVideo};
-//! # let bus = VirtualBus::default();
+//! # use toile_driver_simulated::{d435, uvc::Wire};
+//! # use toile_driver_transport::{simulated::{SimulatedBus, SimulatedVideo}};
+//! # let bus = SimulatedBus::default();
 //! # bus.plug(Arc::new(Mutex::new(d435::model(d435::Pattern::default(), Wire::Bulk))));
-//! # let video = VirtualVideo::new(bus);
+//! # let video = SimulatedVideo::new(bus);
 //! // On a machine with a camera: let video = toile_driver_transport::video::kernel::KernelVideo::default();
 //! let mut camera = Realsense::open(&video, None, Settings::default())?;
 //! let frame = camera.next_frame()?.ok_or("it streams")?;
@@ -28,23 +29,27 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod calibration;
-pub mod controls;
-pub mod decode;
-pub mod device;
-pub mod error;
-pub mod find;
-pub mod health;
+mod calibration;
+mod choose;
+mod clock;
+mod controls;
+mod decode;
+mod device;
+mod error;
+mod find;
+mod health;
 pub mod metadata;
 pub mod monitor;
 mod rig;
-pub mod settings;
-pub mod stream;
+mod settings;
+mod stream;
+mod streams;
 
 pub use calibration::Calibration;
 pub use controls::{Controls, Exposure};
+pub use decode::infrared_pair;
 pub use device::Realsense;
 pub use error::RealsenseError;
-pub use find::{Camera, list};
+pub use find::{Camera, Nodes, list};
 pub use health::Health;
 pub use settings::{Settings, VideoMode};

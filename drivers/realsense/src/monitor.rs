@@ -47,7 +47,7 @@ pub fn command(code: u32, parameter: u32) -> Vec<u8> {
 /// The data of an answer to command `code`.
 ///
 /// # Errors
-/// [`Refusal`]: it says that the command failed, or is no answer to it.
+/// [`Refusal`]: it says that the command failed, or is not an answer to it.
 pub fn answer(code: u32, bytes: &[u8]) -> Result<&[u8], Refusal> {
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let (Some(said), Some(length)) = (word(0), word(LENGTH_AT)) else {
@@ -61,9 +61,9 @@ pub fn answer(code: u32, bytes: &[u8]) -> Result<&[u8], Refusal> {
             _ => Refusal::Wrong(format!("the answer is to command {said:#x}")),
         });
     }
-    let told = length as usize;
-    let data = bytes.get(4..LENGTH_AT).and_then(|data| data.get(..told));
-    data.ok_or_else(|| Refusal::Wrong(format!("the answer says that it has {told} bytes")))
+    let stated = length as usize;
+    let data = bytes.get(4..LENGTH_AT).and_then(|data| data.get(..stated));
+    data.ok_or_else(|| Refusal::Wrong(format!("the answer says that it has {stated} bytes")))
 }
 
 /// Why an answer is none.

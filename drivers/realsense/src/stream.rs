@@ -2,6 +2,7 @@
 
 use std::{collections::VecDeque, path::PathBuf, time::Duration};
 
+use toile_capture::pixels::Rows;
 use toile_driver_transport::{
     TransportError,
     video::{FourCc, PictureLayout, Video, VideoBuffer, VideoNode},
@@ -19,19 +20,19 @@ const METADATA_LIMIT: Duration = Duration::from_millis(50);
 /// finds none free is lost (VIDEO_MAX_FRAME of `linux/videodev2.h`).
 const METADATA_BUFFERS: u32 = 32;
 /// Metadata that may wait for its picture.
-const MOST_WAITING: usize = 64;
+const MAX_WAITING: usize = 64;
 
 /// A picture with what the camera says about it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shot {
+pub(crate) struct Shot {
     /// The picture.
-    pub buffer: VideoBuffer,
+    pub(crate) buffer: VideoBuffer,
     /// What the camera says about it; empty where the kernel gives no metadata.
-    pub metadata: Metadata,
+    pub(crate) metadata: Metadata,
 }
 
 /// A stream of pictures.
-pub struct Stream {
+pub(crate) struct Stream {
     pictures: Box<dyn VideoNode>,
     /// The node, and whether it has whole headers.
     metadata: Option<(Box<dyn VideoNode>, bool)>,
@@ -45,7 +46,7 @@ impl Stream {
     ///
     /// # Errors
     /// [`RealsenseError::Format`] where it has no such pictures, [`RealsenseError::Transport`].
-    pub fn open(
+    pub(crate) fn open(
         video: &dyn Video,
         nodes: &Nodes,
         format: FourCc,
@@ -74,25 +75,26 @@ impl Stream {
         Ok(Self { pictures, metadata, waiting: VecDeque::new(), layout, buffers })
     }
 
-    /// How the pictures are laid out.
-    pub fn layout(&self) -> PictureLayout {
-        self.layout
+    /// How the rows of its pictures lie in their buffers.
+    pub(crate) fn rows(&self) -> Rows {
+        let PictureLayout { width, height, stride, .. } = self.layout;
+        Rows { width, height, stride }
     }
 
     /// True where the kernel gives metadata.
-    pub fn has_metadata(&self) -> bool {
+    pub(crate) fn has_metadata(&self) -> bool {
         self.metadata.is_some()
     }
 
     /// Waits for no more metadata.
-    pub fn drop_metadata(&mut self) {
+    pub(crate) fn drop_metadata(&mut self) {
         self.metadata.iter_mut().for_each(|(node, _)| node.stop());
         self.metadata = None;
         self.waiting.clear();
     }
 
     /// The node of the pictures, which also has the controls.
-    pub fn node(&mut self) -> &mut dyn VideoNode {
+    pub(crate) fn node(&mut self) -> &mut dyn VideoNode {
         &mut *self.pictures
     }
 
@@ -100,7 +102,7 @@ impl Stream {
     ///
     /// # Errors
     /// [`RealsenseError::Transport`].
-    pub fn start(&mut self) -> Result<(), RealsenseError> {
+    pub(crate) fn start(&mut self) -> Result<(), RealsenseError> {
         self.stop();
         self.waiting.clear();
         // Metadata first, so that it has the first picture's too.
@@ -112,7 +114,7 @@ impl Stream {
     }
 
     /// Stops it.
-    pub fn stop(&mut self) {
+    pub(crate) fn stop(&mut self) {
         self.pictures.stop();
         self.metadata.iter_mut().for_each(|(node, _)| node.stop());
     }
@@ -121,7 +123,7 @@ impl Stream {
     ///
     /// # Errors
     /// [`RealsenseError::Transport`].
-    pub fn next(&mut self, limit: Duration) -> Result<Option<Shot>, RealsenseError> {
+    pub(crate) fn next(&mut self, limit: Duration) -> Result<Option<Shot>, RealsenseError> {
         match self.pictures.next_buffer(limit) {
             Ok(buffer) => {
                 let metadata = self.metadata_of(buffer.sequence)?;
@@ -151,7 +153,7 @@ impl Stream {
                 Err(TransportError::TimedOut { .. }) => return Ok(Metadata::default()),
                 Err(error) => return Err(error.into()),
             }
-            while self.waiting.len() > MOST_WAITING {
+            while self.waiting.len() > MAX_WAITING {
                 self.waiting.pop_front();
             }
         }

@@ -6,17 +6,17 @@ mod common;
 use std::sync::{Arc, Mutex};
 
 use common::{depth_fault, pattern, plugged, settings};
-use toile_driver_models::{
+use toile_driver_realsense::{Realsense, Settings, VideoMode};
+use toile_driver_simulated::{
     trials,
     uvc::{StreamFault, Wire},
 };
-use toile_driver_realsense::{Realsense, Settings, VideoMode};
-use toile_driver_transport::video::twin::VirtualVideo;
+use toile_driver_transport::simulated::SimulatedVideo;
 
 #[test]
 fn a_recorded_take_replayed_and_recorded_again_is_the_same() {
     let (bus, ..) = plugged(pattern(Wire::Isochronous));
-    let mut camera = Realsense::open(&VirtualVideo::new(bus), None, settings()).unwrap();
+    let mut camera = Realsense::open(&SimulatedVideo::new(bus), None, settings()).unwrap();
     trials::recorded_again_is_the_same(tempfile::tempdir().unwrap().path(), &mut camera, 5);
 }
 
@@ -28,7 +28,7 @@ fn a_hundred_unplugs_and_replugs_end_cleanly_and_nothing_is_kept() {
         let fault = depth_fault(1 + cycle % 2, 17 * cycle as usize % 38, StreamFault::Unplug);
         let model = Arc::new(Mutex::new(pattern(Wire::Bulk).with_faults([fault])));
         bus.plug(model.clone());
-        let camera = Realsense::open(&VirtualVideo::new(bus.clone()), None, settings()).unwrap();
+        let camera = Realsense::open(&SimulatedVideo::new(bus.clone()), None, settings()).unwrap();
         (model, Box::new(camera))
     });
 }
@@ -38,6 +38,6 @@ fn a_hundred_unplugs_and_replugs_end_cleanly_and_nothing_is_kept() {
 fn ten_thousand_frames_leave_memory_flat() {
     let (bus, ..) = plugged(pattern(Wire::Bulk));
     let small = Settings { video: VideoMode::Off, size: (424, 240), ..settings() };
-    let mut camera = Realsense::open(&VirtualVideo::new(bus), None, small).unwrap();
+    let mut camera = Realsense::open(&SimulatedVideo::new(bus), None, small).unwrap();
     trials::memory_stays_flat(&mut camera, 10_000, 40_000);
 }

@@ -7,15 +7,17 @@ use std::{path::Path, time::Instant};
 
 use common::{color_fault, depth_fault, faulty, has_color_of, has_depth_of, pattern, plugged, settings};
 use toile_capture::Source;
-use toile_driver_models::{
+use toile_driver_realsense::{Health, Realsense};
+use toile_driver_simulated::{
     d435::MonitorFault,
     trials::take,
     uvc::{StreamFault, Wire},
 };
-use toile_driver_realsense::{Health, Realsense};
 use toile_driver_transport::{
-    TransportError, udev,
-    video::{NodeInfo, Video, VideoNode, twin::VirtualVideo},
+    TransportError,
+    simulated::SimulatedVideo,
+    udev,
+    video::{NodeInfo, Video, VideoNode},
 };
 
 /// Frame 2's depth is spoilt by a fault: it comes with colour alone, its neighbours are whole.
@@ -48,7 +50,7 @@ fn lost_damaged_short_and_torn_packets_cost_their_picture_only() {
     ] {
         for packet in [1, 100, 200] {
             let health = spoils_frame_2(Wire::Isochronous, what, packet);
-            // The kernel's number tells, where the packets that came were enough to count the picture at all.
+            // The kernel's number shows it, where the packets that came were enough to count the picture at all.
             assert_eq!(health.lost_pictures[0], 1, "{what:?} at {packet}");
         }
     }
@@ -69,23 +71,23 @@ fn more_than_a_picture_holds_is_a_damaged_picture() {
     assert_eq!(spoils_frame_2(Wire::Isochronous, StreamFault::Long(60), 200).lost_pictures[0], 1);
 }
 
-/// Pictures are told apart by one bit: after a picture that is lost whole, the kernel takes the next one for more of the
-/// one before, and drops it too (`uvc_video_decode_start`). The camera's time tells how many are missing.
+/// Pictures are distinguished by one bit: after a picture that is lost whole, the kernel takes the next one for more of the
+/// one before, and drops it too (`uvc_video_decode_start`). The camera's time shows how many are missing.
 #[test]
 fn a_picture_that_is_lost_whole_takes_the_next_with_it_and_both_are_counted() {
     for (wire, what) in [(Wire::Isochronous, StreamFault::Lost(usize::MAX)), (Wire::Bulk, StreamFault::HeaderLength(1))]
     {
         let mut camera = faulty(wire, &[depth_fault(3, 0, what), color_fault(3, 0, what)]);
         let (frames, _) = take(&mut camera, 5);
-        let told: Vec<_> = frames.iter().map(|f| (f.device_frame, f.lost_before)).collect();
-        assert_eq!(told, [(0, 0), (1, 0), (2, 0), (5, 2), (6, 0)], "{what:?}");
+        let stated: Vec<_> = frames.iter().map(|f| (f.device_frame, f.lost_before)).collect();
+        assert_eq!(stated, [(0, 0), (1, 0), (2, 0), (5, 2), (6, 0)], "{what:?}");
         assert!(frames.iter().all(|f| has_depth_of(f, f.device_frame) && has_color_of(f, f.device_frame)));
         assert_eq!((camera.health().lost_frames, camera.health().alone), (2, [0, 0]));
     }
 }
 
 #[test]
-fn late_packets_are_no_loss() {
+fn late_packets_are_not_a_loss() {
     let late = [depth_fault(2, 30, StreamFault::Late(20)), color_fault(3, 0, StreamFault::Late(50))];
     let mut camera = faulty(Wire::Isochronous, &late);
     let (frames, _) = take(&mut camera, 6);
@@ -113,11 +115,11 @@ fn a_jump_of_seconds_is_no_loss() {
 
 /// Depth tells its time and colour never does: both go on by one clock, and pair.
 #[test]
-fn a_stream_that_never_tells_its_time_pairs_with_one_that_did() {
+fn a_stream_that_never_states_its_time_pairs_with_one_that_did() {
     // The camera's clock began seven seconds before the kernel's.
     let time = |k: u64| StreamFault::Time(7_000_000 + (k * 1_000_000 / 30) as u32);
-    let told = (0..60).flat_map(|k| [depth_fault(k, 0, time(k)), color_fault(k, 0, StreamFault::NoTime)]);
-    let mut camera = faulty(Wire::Isochronous, &told.collect::<Vec<_>>());
+    let stated = (0..60).flat_map(|k| [depth_fault(k, 0, time(k)), color_fault(k, 0, StreamFault::NoTime)]);
+    let mut camera = faulty(Wire::Isochronous, &stated.collect::<Vec<_>>());
     let (frames, error) = take(&mut camera, 20);
     assert!(error.is_none(), "{error:?}");
     assert_eq!(frames.iter().map(|f| f.lost_before).sum::<u32>(), 0);
@@ -126,7 +128,7 @@ fn a_stream_that_never_tells_its_time_pairs_with_one_that_did() {
 
 /// By bulk the camera runs ahead of the kernel's clock: pictures whose time is guessed would find the wrong partner.
 #[test]
-fn a_picture_whose_time_is_not_told_is_lost_and_counted() {
+fn a_picture_whose_time_is_not_stated_is_lost_and_counted() {
     let untold: Vec<_> = (2..=4).map(|frame| depth_fault(frame, 0, StreamFault::NoTime)).collect();
     for wire in [Wire::Bulk, Wire::Isochronous] {
         let mut camera = faulty(wire, &untold);
@@ -144,7 +146,7 @@ fn a_picture_whose_time_is_not_told_is_lost_and_counted() {
     }
 }
 
-/// A camera that tells no more time at all goes on by the kernel's clock.
+/// A camera that states no time any more goes on by the kernel's clock.
 #[test]
 fn a_clock_that_falls_silent_is_replaced_by_the_kernels() {
     let untold =
@@ -162,7 +164,7 @@ fn a_clock_that_falls_silent_is_replaced_by_the_kernels() {
 }
 
 #[test]
-fn a_silent_or_halted_stream_is_woken_once_and_then_told() {
+fn a_silent_or_halted_stream_is_restarted_once_and_then_reported() {
     for (wire, what) in
         [(Wire::Isochronous, StreamFault::Silent), (Wire::Bulk, StreamFault::Silent), (Wire::Bulk, StreamFault::Stall)]
     {
@@ -219,7 +221,7 @@ fn firmware_that_answers_nonsense_is_refused_in_words() {
         model.scene().monitor.fault = Some(fault);
         let (bus, ..) = plugged(model);
         let start = Instant::now();
-        let opened = Realsense::open(&VirtualVideo::new(bus), None, settings());
+        let opened = Realsense::open(&SimulatedVideo::new(bus), None, settings());
         let error = opened.err().map(|e| e.to_string()).unwrap_or_default();
         assert!(error.contains(words), "{fault:?}: {error}");
         assert!(start.elapsed().as_secs() < 10);
@@ -231,11 +233,11 @@ fn firmware_that_is_starting_is_waited_for() {
     let mut model = pattern(Wire::Bulk);
     model.scene().monitor.fault = Some(MonitorFault::NotReady(2));
     let (bus, ..) = plugged(model);
-    assert!(Realsense::open(&VirtualVideo::new(bus), None, settings()).unwrap().next_frame().unwrap().is_some());
+    assert!(Realsense::open(&SimulatedVideo::new(bus), None, settings()).unwrap().next_frame().unwrap().is_some());
 }
 
 /// Nodes that may not be opened.
-struct Locked(VirtualVideo);
+struct Locked(SimulatedVideo);
 
 impl Video for Locked {
     fn list(&self) -> Result<Vec<NodeInfo>, TransportError> {
@@ -248,8 +250,8 @@ impl Video for Locked {
 }
 
 #[test]
-fn a_camera_that_may_not_be_opened_is_told_with_the_rule() {
+fn a_camera_that_may_not_be_opened_is_reported_with_the_rule() {
     let (bus, ..) = plugged(pattern(Wire::Bulk));
-    let error = Realsense::open(&Locked(VirtualVideo::new(bus)), None, settings()).err().unwrap().to_string();
+    let error = Realsense::open(&Locked(SimulatedVideo::new(bus)), None, settings()).err().unwrap().to_string();
     assert!(error.contains("permission") && error.contains("idVendor}==\"8086\""), "{error}");
 }

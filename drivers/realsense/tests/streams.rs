@@ -6,19 +6,19 @@ mod common;
 use common::{SIZE, has_color_of, has_depth_of, pattern, plugged, settings};
 use nalgebra::Point3;
 use toile_capture::{ClockDomain, ColorImage, Source};
-use toile_driver_models::{
+use toile_driver_realsense::{Controls, Exposure, Realsense, Settings, VideoMode, list};
+use toile_driver_simulated::{
     d435::{self, Content, Optics, Pattern, Rendered},
     uvc::Wire,
 };
-use toile_driver_realsense::{Controls, Exposure, Realsense, Settings, VideoMode, list};
-use toile_driver_transport::video::twin::VirtualVideo;
+use toile_driver_transport::simulated::SimulatedVideo;
 use toile_synthetic::{Subject, SyntheticSettings, sensor::SensorPreset};
 
 #[test]
 fn forty_frames_are_identical_and_none_is_lost_by_bulk_and_isochronous() {
     for (wire, is_whole) in [(Wire::Bulk, false), (Wire::Isochronous, false), (Wire::Isochronous, true)] {
         let (bus, ..) = plugged(pattern(wire));
-        let video = if is_whole { VirtualVideo::with_whole_headers(bus) } else { VirtualVideo::new(bus) };
+        let video = if is_whole { SimulatedVideo::with_whole_headers(bus) } else { SimulatedVideo::new(bus) };
         let mut camera = Realsense::open(&video, None, settings()).unwrap();
         for k in 0..40 {
             let frame = camera.next_frame().unwrap().unwrap();
@@ -35,7 +35,7 @@ fn forty_frames_are_identical_and_none_is_lost_by_bulk_and_isochronous() {
 #[test]
 fn a_camera_and_its_nodes_are_found_and_it_is_left_switched_off() {
     let (bus, _, model) = plugged(pattern(Wire::Isochronous));
-    let video = VirtualVideo::new(bus);
+    let video = SimulatedVideo::new(bus);
     let found = list(&video).unwrap();
     assert_eq!((found.len(), found[0].name, found[0].serial.as_str()), (1, "RealSense D435", "827313080543"));
     let nodes = [&found[0].depth, &found[0].infrared, &found[0].color].map(|n| n.clone().unwrap());
@@ -61,7 +61,7 @@ fn a_camera_and_its_nodes_are_found_and_it_is_left_switched_off() {
 fn lenses_and_places_are_those_of_the_tables() {
     let truth = Optics::default();
     let (bus, ..) = plugged(pattern(Wire::Bulk));
-    let camera = Realsense::open(&VirtualVideo::new(bus), None, settings()).unwrap();
+    let camera = Realsense::open(&SimulatedVideo::new(bus), None, settings()).unwrap();
     let sensor = &camera.rig().sensors[0];
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-4, "{a} {b}");
     let (depth, color) = (sensor.depth, sensor.color.unwrap());
@@ -89,7 +89,7 @@ fn lenses_and_places_are_those_of_the_tables() {
 fn the_infrared_pair_comes_beside_depth_and_as_a_sensor_of_its_own() {
     let (bus, ..) = plugged(pattern(Wire::Isochronous));
     let settings = Settings { video: VideoMode::Infrared, ..settings() };
-    let mut camera = Realsense::open(&VirtualVideo::new(bus), None, settings).unwrap();
+    let mut camera = Realsense::open(&SimulatedVideo::new(bus), None, settings).unwrap();
     let rig = camera.rig().clone();
     assert_eq!(rig.sensors.len(), 2);
     assert!((rig.sensors[1].rig_from_depth.translation.x - 0.05).abs() < 1e-6);
@@ -109,7 +109,7 @@ fn the_infrared_pair_comes_beside_depth_and_as_a_sensor_of_its_own() {
 #[test]
 fn a_camera_without_colour_gives_depth_alone_in_its_own_unit() {
     let (bus, ..) = plugged(d435::d405(Pattern::default(), Wire::Isochronous));
-    let video = VirtualVideo::new(bus);
+    let video = SimulatedVideo::new(bus);
     let found = &list(&video).unwrap()[0];
     assert_eq!((found.name, found.has_color_part(), found.color.is_some()), ("RealSense D405", false, false));
     let mut camera = Realsense::open(&video, None, settings()).unwrap();
@@ -131,11 +131,11 @@ fn controls_are_set_and_read() {
         preset: Some(3),
     };
     let settings = Settings { controls, video: VideoMode::Off, ..settings() };
-    let mut camera = Realsense::open(&VirtualVideo::new(bus), None, settings).unwrap();
+    let mut camera = Realsense::open(&SimulatedVideo::new(bus), None, settings).unwrap();
     assert_eq!(camera.controls().unwrap(), controls);
-    let told = |selector| model.lock().unwrap().scene().monitor.control(selector).unwrap().to_vec();
-    assert_eq!([told(2), told(4), told(0x0b), told(6)], [vec![0], vec![240, 0], vec![0], vec![3]]);
-    assert_eq!(told(3), 7000u32.to_le_bytes());
+    let stated = |selector| model.lock().unwrap().scene().monitor.control(selector).unwrap().to_vec();
+    assert_eq!([stated(2), stated(4), stated(0x0b), stated(6)], [vec![0], vec![240, 0], vec![0], vec![3]]);
+    assert_eq!(stated(3), 7000u32.to_le_bytes());
     assert!(camera.next_frame().unwrap().unwrap().color.is_none());
 }
 
@@ -146,7 +146,7 @@ fn a_rendered_person_arrives_as_rendered() {
     let person = Subject::new(&settings).unwrap();
     let mut truth = Rendered::new(person.take(0).unwrap());
     let (bus, ..) = plugged(d435::model(Rendered::new(person.take(0).unwrap()), Wire::Isochronous));
-    let mut camera = Realsense::open(&VirtualVideo::new(bus), None, common::settings()).unwrap();
+    let mut camera = Realsense::open(&SimulatedVideo::new(bus), None, common::settings()).unwrap();
     for k in 0..2 {
         let frame = camera.next_frame().unwrap().unwrap();
         let (depth, color) = truth.frame(k).clone();

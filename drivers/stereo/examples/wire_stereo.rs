@@ -21,7 +21,7 @@ use std::{
 };
 
 use toile_capture::{ColorImage, DepthImage, Frame, RgbImage};
-use toile_driver_models::{
+use toile_driver_simulated::{
     proof::{self, Shown, same},
     side_by_side::{self, Views},
     uvc::Wire,
@@ -30,7 +30,7 @@ use toile_driver_models::{
 use toile_driver_stereo::{Cameras, StereoSettings};
 use toile_stereo::{DepthFromPair, DepthSettings, Lens, StereoCalibration, read_calibration, rectify};
 
-/// The camera waits so long between frames: the matcher takes an emulated processor most of a second.
+/// The camera waits this long between frames: the matcher takes an emulated processor most of a second.
 const PACE: Duration = Duration::from_secs(1);
 /// So many frames differ.
 const FRAMES: u64 = 5;
@@ -46,7 +46,7 @@ fn main() -> Outcome<()> {
         ["write", folder] => write(Path::new(folder))?,
         ["serve", folder] => {
             let model = side_by_side::model(Scene::read(Path::new(folder))?, Wire::Isochronous);
-            // The kernel lets go when it is told to; what was being written then is of no use to it.
+            // The kernel lets go when it is asked to; what was being written then is of no use to it.
             if let Err(error) = vhci::plug(Arc::new(Mutex::new(model)))?.wait() {
                 println!("server: {error}");
             }

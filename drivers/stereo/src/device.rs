@@ -39,7 +39,7 @@ pub enum Cameras {
 }
 
 /// Columns and rows that no camera's view exceeds.
-const MOST_PIXELS: u32 = 16_384;
+const MAX_PIXELS: u32 = 16_384;
 
 /// A stereo rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -76,7 +76,7 @@ pub struct PairCounts {
     pub left_alone: u64,
     /// Right pictures without a left one: counted here only, since nothing can be shown in the left camera's place.
     pub right_alone: u64,
-    /// Pictures that were not whole, each told by an error.
+    /// Pictures that were not whole, each reported as an error.
     pub torn: u64,
 }
 
@@ -88,7 +88,7 @@ pub struct StereoCamera {
     counts: PairCounts,
     next_index: u64,
     last_left: Option<u64>,
-    /// A camera failed: that was told, and nothing comes after it.
+    /// A camera failed: that was reported, and nothing comes after it.
     ended: bool,
 }
 
@@ -99,7 +99,7 @@ impl StereoCamera {
     /// [`StereoDriverError`] names the node, file or setting.
     pub fn open(video: &dyn Video, settings: &StereoSettings) -> Result<Self, StereoDriverError> {
         let StereoSettings { width, height, fps, .. } = *settings;
-        if width.max(height) > MOST_PIXELS {
+        if width.max(height) > MAX_PIXELS {
             return Err(StereoDriverError::Size { width, height });
         }
         let calibration = read_calibration(&settings.calibration, settings.metres_per_unit)?;
@@ -189,7 +189,7 @@ impl StereoCamera {
     }
 
     /// Errors of one picture are of one frame; the rest are the device's.
-    fn told(&mut self, error: StereoDriverError) -> CaptureError {
+    fn reported(&mut self, error: StereoDriverError) -> CaptureError {
         match error {
             StereoDriverError::Picture { .. } => {
                 self.counts.torn += 1;
@@ -211,7 +211,7 @@ impl Source for StereoCamera {
 
     fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
         while !self.ended {
-            match self.pairs.next_moment().map_err(|e| self.told(e))? {
+            match self.pairs.next_moment().map_err(|e| self.reported(e))? {
                 None => return Ok(None),
                 Some(Moment::Pair(left, right)) => {
                     let frame = self.frame(&left, Some(&right))?;

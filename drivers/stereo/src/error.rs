@@ -25,7 +25,7 @@ pub enum StereoDriverError {
         /// Rows asked for.
         height: u32,
     },
-    /// The settings tell pictures larger than any camera's.
+    /// The settings ask for pictures larger than any camera's.
     #[error("`width` and `height` are {width} and {height}, but no camera has more than 16384; give those of one view")]
     Size {
         /// Columns of a view.

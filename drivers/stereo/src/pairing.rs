@@ -45,7 +45,7 @@ pub enum Moment {
 }
 
 /// Pictures of one camera that may wait for the other. A camera that lags further behind is taken for silent.
-const MOST_WAITING: usize = 8;
+const MAX_WAITING: usize = 8;
 
 /// Two queues of pictures, each in the order of time.
 #[derive(Debug)]
@@ -107,7 +107,7 @@ impl Pairer {
     }
 
     fn alone_if_silent(&mut self, side: Side, other: Side) -> Option<Moment> {
-        let is_silent = self.ended[other as usize] || self.waiting[side as usize].len() > MOST_WAITING;
+        let is_silent = self.ended[other as usize] || self.waiting[side as usize].len() > MAX_WAITING;
         if is_silent { self.alone(side) } else { None }
     }
 
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn a_silent_camera_does_not_hold_the_other_for_ever() {
         let mut pairer = Pairer::new(100);
-        (0..=MOST_WAITING as i64).for_each(|k| pairer.push(Side::Left, picture(100 * k)));
+        (0..=MAX_WAITING as i64).for_each(|k| pairer.push(Side::Left, picture(100 * k)));
         assert!(matches!(pairer.pop(), Some(Moment::Alone(Side::Left, p)) if p.time_ns == 0));
         assert_eq!(pairer.pop(), None);
     }

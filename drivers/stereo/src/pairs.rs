@@ -56,7 +56,7 @@ pub struct TwoCameras<L: Pictures, R: Pictures> {
     right: R,
     pairer: Pairer,
     ended: [bool; 2],
-    /// What ended a camera, to be told after the pairs that came.
+    /// What ended a camera, to be reported after the pairs that came.
     failed: Option<StereoDriverError>,
 }
 
@@ -76,7 +76,7 @@ impl<L: Pictures, R: Pictures> Pairs for TwoCameras<L, R> {
             let is_over = match self.ended {
                 [false, false] => false,
                 [true, true] => true,
-                // The rest of a recording is told, the rest of a camera without a partner is not waited for.
+                // The rest of a recording is given, the rest of a camera without a partner is not waited for.
                 [_, right] => {
                     if right {
                         self.left.is_live()
@@ -149,7 +149,7 @@ impl<S: Source> Pairs for TwoSensors<S> {
     }
 }
 
-/// Nanoseconds a frame; a rate that is none counts as 30.
+/// Nanoseconds a frame; an impossible rate counts as 30.
 fn period_ns(fps: f64) -> i64 {
     let fps = if fps.is_finite() && fps > 0.0 { fps } else { 30.0 };
     (1e9 / fps).round() as i64

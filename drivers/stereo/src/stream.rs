@@ -105,11 +105,11 @@ impl FolderPictures {
     /// The PNG and JPEG files of `folder` whose names begin with `prefix` (which may be empty) and go on with a number.
     ///
     /// # Errors
-    /// [`StereoDriverError::Recorded`] where there are none, or the rate is no rate.
+    /// [`StereoDriverError::Recorded`] where there are none, or the rate is impossible.
     pub fn open(folder: &Path, prefix: &str, side: Side, fps: f64) -> Result<Self, StereoDriverError> {
         let wrong = |reason: String| StereoDriverError::Recorded { path: folder.to_path_buf(), reason };
         if !(fps.is_finite() && fps > 0.0) {
-            return Err(wrong(format!("{fps} pictures a second is no rate")));
+            return Err(wrong(format!("{fps} pictures a second is not a possible rate")));
         }
         let entries = std::fs::read_dir(folder).map_err(|e| wrong(e.to_string()))?;
         let mut files: Vec<(u64, PathBuf)> =

@@ -11,7 +11,10 @@ use toile_driver_stereo::{
     Cameras, PairCounts, Pairs, Picture, Pictures, Side, SideBySide, StereoCamera, StereoDriverError, StereoSettings,
     TwoCameras, TwoSensors,
 };
-use toile_driver_transport::{TransportError, twin::VirtualBus, video::twin::VirtualVideo};
+use toile_driver_transport::{
+    TransportError,
+    simulated::{SimulatedBus, SimulatedVideo},
+};
 use toile_stereo::DepthSettings;
 
 /// Nanoseconds a frame.
@@ -142,7 +145,7 @@ fn a_side_by_side_camera_gives_the_same_frame_as_two_cameras() {
 const SIZE_W: usize = scene::SIZE.0 as usize;
 
 #[test]
-fn unpaired_pictures_are_delivered_or_counted_and_losses_are_told() {
+fn unpaired_pictures_are_delivered_or_counted_and_losses_are_reported() {
     let mut camera = camera(two(&[0, 1, 2, 5], &[0, 2, 3, 5]));
     let frames = all(&mut camera);
     let seen: Vec<_> = frames.iter().map(|f| (f.index, f.device_frame, f.lost_before, f.depth.is_some())).collect();
@@ -199,7 +202,7 @@ fn folders_of_pictures_and_recordings_of_two_sensors_are_rigs_too() {
     std::fs::write(&calibration, calibration_text()).unwrap();
     let cameras = Cameras::Folder { path: folder.path().into() };
     let chosen = StereoSettings { cameras, calibration: vec![calibration], ..settings() };
-    let mut rig = StereoCamera::open(&VirtualVideo::new(VirtualBus::default()), &chosen).unwrap();
+    let mut rig = StereoCamera::open(&SimulatedVideo::new(SimulatedBus::default()), &chosen).unwrap();
     let from_folder = [rig.next_frame().unwrap().unwrap(), rig.next_frame().unwrap().unwrap()];
     assert!(from_folder.iter().all(|f| f.depth.is_some()));
     let error = rig.next_frame().unwrap_err().to_string();
@@ -274,7 +277,7 @@ fn true_depth(rectified_from_left: &Matrix3<f64>, ray: Vector2<f64>) -> f64 {
 
 #[test]
 fn settings_of_impossible_size_are_refused() {
-    let video = VirtualVideo::new(VirtualBus::default());
+    let video = SimulatedVideo::new(SimulatedBus::default());
     let chosen = StereoSettings { width: u32::MAX, ..settings() };
     let error = StereoCamera::open(&video, &chosen).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(error.contains("4294967295") && error.contains("one view"), "{error}");

@@ -6,12 +6,12 @@ mod scene;
 use std::sync::{Arc, Mutex};
 
 use toile_capture::{RgbImage, Source};
-use toile_driver_models::{
+use toile_driver_simulated::{
     side_by_side::{self, Views},
     uvc::{Fault, StreamFault, Wire},
 };
 use toile_driver_stereo::{Cameras, NodePictures, Pictures, Side, SideBySide, StereoCamera, StereoSettings, nodes};
-use toile_driver_transport::{twin::VirtualBus, video::twin::VirtualVideo};
+use toile_driver_transport::simulated::{SimulatedBus, SimulatedVideo};
 use toile_stereo::DepthSettings;
 
 /// Both views of the scene, as brightness; frames differ in their first pixel.
@@ -38,13 +38,13 @@ fn shown(brightness: &[u8]) -> Vec<[u8; 3]> {
     brightness.iter().map(|y| [grey(y); 3]).collect()
 }
 
-fn video(wire: Wire, faults: &[Fault]) -> VirtualVideo {
-    let bus = VirtualBus::default();
+fn video(wire: Wire, faults: &[Fault]) -> SimulatedVideo {
+    let bus = SimulatedBus::default();
     bus.plug(Arc::new(Mutex::new(side_by_side::model(Scene, wire).with_faults(faults.iter().copied()))));
-    VirtualVideo::new(bus)
+    SimulatedVideo::new(bus)
 }
 
-fn pictures(video: &VirtualVideo) -> NodePictures {
+fn pictures(video: &SimulatedVideo) -> NodePictures {
     let node = nodes::list(video)[0].node.clone();
     NodePictures::open(video, &node, Side::Left, (2 * scene::SIZE.0, scene::SIZE.1)).unwrap()
 }
@@ -132,8 +132,8 @@ fn bytes_too_many_and_headers_that_cannot_be_cost_their_picture_only() {
         (Wire::Bulk, StreamFault::Lost(1), 3),
     ] {
         let mut pictures = pictures(&video(wire, &[fault(2, packet, what)]));
-        let told = numbers(&mut pictures, 4);
-        assert_eq!(told, [0, 1, 3, 4], "{wire:?} {what:?}");
+        let stated = numbers(&mut pictures, 4);
+        assert_eq!(stated, [0, 1, 3, 4], "{wire:?} {what:?}");
     }
 }
 
@@ -147,7 +147,7 @@ fn a_stream_that_is_refused_ends_the_take_in_words() {
 }
 
 #[test]
-fn a_size_that_the_camera_has_not_is_told() {
+fn a_size_that_the_camera_lacks_is_refused() {
     let video = video(Wire::Bulk, &[]);
     let node = nodes::list(&video)[0].node.clone();
     let opened = NodePictures::open(&video, &node, Side::Left, (1000, 300));
@@ -156,7 +156,7 @@ fn a_size_that_the_camera_has_not_is_told() {
 }
 
 #[test]
-fn a_silent_camera_is_told_and_then_the_take_ends() {
+fn a_silent_camera_is_reported_and_then_the_take_ends() {
     let mut camera = rig(pictures(&video(Wire::Isochronous, &[fault(2, 5, StreamFault::Silent)])));
     assert!((0..2).all(|_| camera.next_frame().unwrap().is_some()));
     let error = camera.next_frame().unwrap_err().to_string();

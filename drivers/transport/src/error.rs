@@ -1,8 +1,11 @@
 //! What can go wrong between a program and a USB device.
 
-use std::time::Duration;
+use std::{io, path::Path, time::Duration};
 
-use crate::{DeviceInfo, udev};
+use crate::{DeviceInfo, udev::advice};
+
+/// What Linux says of a node whose device was unplugged.
+const ENODEV: i32 = 19;
 
 /// Errors of the transport crate.
 #[derive(Debug, thiserror::Error)]
@@ -28,7 +31,7 @@ pub enum TransportError {
     #[error("the device was unplugged; plug it in and open it again")]
     Unplugged,
     /// This user may not open the device.
-    #[error("{device}: no permission to open it. {}", udev::advice(.device.vendor))]
+    #[error("{device}: no permission to open it. {}", advice(.device.vendor))]
     NoPermission {
         /// Which device.
         device: DeviceInfo,
@@ -71,6 +74,15 @@ pub enum TransportError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The kernel's memory for USB transfers is used up, perhaps by another program.
+    #[error(
+        "{what}: the kernel has no memory left for USB transfers; allow more with \
+         `echo 64 | sudo tee /sys/module/usbcore/parameters/usbfs_memory_mb`, or close other programs that use cameras"
+    )]
+    NoMemory {
+        /// What was asked.
+        what: String,
+    },
     /// Anything else that libusb reports.
     #[error("{what}: {source}")]
     Failed {
@@ -89,7 +101,33 @@ impl TransportError {
             rusb::Error::NoDevice => Self::Unplugged,
             rusb::Error::Timeout => Self::TimedOut { what, waited },
             rusb::Error::Pipe => Self::Stalled { what },
+            rusb::Error::NoMem => Self::NoMemory { what },
             source => Self::Failed { what, source },
         }
+    }
+
+    /// Sorts an error of a video node into what a caller can act on.
+    pub(crate) fn from_video(node: &Path, action: &'static str, source: io::Error) -> Self {
+        match source.raw_os_error() {
+            Some(ENODEV) => Self::Unplugged,
+            _ => Self::Video { node: node.into(), action, source },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_error_of_libusb_that_a_caller_can_act_on_has_a_variant_of_its_own() {
+        let sorted = |error| TransportError::from_libusb(error, "starting a transfer", Duration::ZERO);
+        assert!(matches!(sorted(rusb::Error::NoDevice), TransportError::Unplugged));
+        assert!(matches!(sorted(rusb::Error::Timeout), TransportError::TimedOut { .. }));
+        assert!(matches!(sorted(rusb::Error::Pipe), TransportError::Stalled { .. }));
+        let memory = sorted(rusb::Error::NoMem);
+        assert!(matches!(&memory, TransportError::NoMemory { what } if what == "starting a transfer"));
+        assert!(memory.to_string().contains("usbfs_memory_mb"), "{memory}");
+        assert!(matches!(sorted(rusb::Error::Io), TransportError::Failed { .. }));
     }
 }

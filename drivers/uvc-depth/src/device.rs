@@ -1,57 +1,18 @@
 //! The camera as a source of frames.
 
-use std::{path::Path, sync::Arc, time::Duration};
+use std::path::Path;
 
-use toile_capture::{CaptureError, Frame, Rig, Source, host_now_ns};
-use toile_driver_transport::{
-    TransportError,
-    video::{Video, VideoBuffer, VideoNode},
-};
+use toile_capture::{CaptureError, Frame, Rig, Source, pixels::Rows};
+use toile_driver_transport::{streaming::Streaming, video::Video};
 
-use crate::{UvcDepthError, calibration, decode, decode::Layout, nodes::depth_format, numbering::Numbering};
-
-/// How to stream.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Settings {
-    /// Buffers that the kernel may fill ahead of us. Default 8: a quarter of a second.
-    pub buffers: u32,
-    /// After so long without a frame the stream is switched off and on once; after as long again that is an error.
-    /// Default 2 s.
-    pub frame_limit: Duration,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { buffers: 8, frame_limit: Duration::from_secs(2) }
-    }
-}
-
-/// How well it went so far.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Health {
-    /// Frames given.
-    pub frames: u64,
-    /// Frames that the driver lost or kept to itself because they were damaged.
-    pub lost: u64,
-    /// Frames that came and could not be read.
-    pub broken: u64,
-    /// How often the stream was switched off and on.
-    pub restarts: u32,
-}
+use crate::{Health, Settings, UvcDepthError, calibration, nodes::depth_format, stream::DepthStream};
 
 /// A UVC depth camera: depth only, intrinsics from a file.
 ///
 /// After an unplug or a silence there is one error, then the end.
 pub struct UvcDepthCamera {
-    node: Box<dyn VideoNode>,
-    layout: Layout,
-    settings: Settings,
+    streaming: Streaming<DepthStream>,
     rig: Rig,
-    health: Health,
-    numbering: Numbering,
-    /// No frame came since the stream was switched off and on.
-    is_last_try: bool,
-    ended: bool,
 }
 
 impl UvcDepthCamera {
@@ -81,59 +42,13 @@ impl UvcDepthCamera {
             );
             return Err(UvcDepthError::Calibration { path: calibration_file.to_path_buf(), reason: what });
         }
-        opened.start(settings.buffers)?;
-        Ok(Self {
-            node: opened,
-            layout: Layout { width, height, stride: given.stride },
-            settings,
-            rig: Rig { sensors: vec![sensor] },
-            health: Health::default(),
-            numbering: Numbering::default(),
-            is_last_try: false,
-            ended: false,
-        })
+        let stream = DepthStream::start(opened, Rows { width, height, stride: given.stride }, settings)?;
+        Ok(Self { streaming: Streaming::new(stream, settings.frame_limit), rig: Rig { sensors: vec![sensor] } })
     }
 
     /// How well it went so far.
     pub fn health(&self) -> Health {
-        self.health
-    }
-
-    /// The next buffer; after a silence once more from the start.
-    fn next_buffer(&mut self) -> Result<VideoBuffer, UvcDepthError> {
-        loop {
-            match self.node.next_buffer(self.settings.frame_limit) {
-                Err(TransportError::TimedOut { .. }) if self.is_last_try => {
-                    return Err(UvcDepthError::Silent(self.settings.frame_limit.as_secs_f64()));
-                }
-                Err(TransportError::TimedOut { .. }) => {
-                    self.is_last_try = true;
-                    self.numbering.restart();
-                    self.health.restarts += 1;
-                    self.node.stop();
-                    self.node.start(self.settings.buffers)?;
-                }
-                other => return Ok(other?),
-            }
-        }
-    }
-
-    fn frame(&mut self, buffer: &VideoBuffer) -> Result<Frame, UvcDepthError> {
-        let (number, lost) = self.numbering.count(buffer.sequence, buffer.time_ns);
-        self.health.lost += lost;
-        self.is_last_try = false;
-        let depth = decode::depth16(&buffer.bytes, self.layout)?;
-        self.health.frames += 1;
-        Ok(Frame {
-            sensor: 0,
-            index: self.health.frames - 1,
-            device_frame: number,
-            lost_before: u32::try_from(lost).unwrap_or(u32::MAX),
-            device_time_ns: buffer.time_ns,
-            host_time_ns: host_now_ns(),
-            depth: Some(Arc::new(depth)),
-            color: None,
-        })
+        Health { restarts: self.streaming.restarts(), ..self.streaming.streams().health() }
     }
 }
 
@@ -143,17 +58,13 @@ impl Source for UvcDepthCamera {
     }
 
     fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
-        if self.ended {
-            return Ok(None);
-        }
-        let buffer = self.next_buffer().map_err(|error| {
-            self.ended = true;
-            CaptureError::Device { device: self.rig.sensors[0].name.clone(), reason: error.to_string() }
-        })?;
-        let frame = self.frame(&buffer).map_err(|error| {
-            self.health.broken += 1;
-            CaptureError::Frame { index: self.health.frames, reason: error.to_string() }
-        })?;
-        Ok(Some(frame))
+        self.streaming.next_frame().map_err(|error| {
+            let reason = error.to_string();
+            match error {
+                // The frames after it may be whole.
+                UvcDepthError::Pixels(_) => CaptureError::Frame { index: self.health().frames, reason },
+                _ => CaptureError::Device { device: self.rig.sensors[0].name.clone(), reason },
+            }
+        })
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use toile_capture::pixels::PixelError;
 use toile_driver_transport::TransportError;
 
 /// Errors of the UVC depth driver.
@@ -32,17 +33,6 @@ pub enum UvcDepthError {
         reason: String,
     },
     /// A buffer is too short for its image.
-    #[error("a buffer holds {bytes} bytes where {width}x{height} at {stride} bytes a row needs {needed}")]
-    ShortBuffer {
-        /// Bytes that came.
-        bytes: usize,
-        /// Columns.
-        width: u32,
-        /// Rows.
-        height: u32,
-        /// Bytes a row.
-        stride: u32,
-        /// Bytes that are needed.
-        needed: usize,
-    },
+    #[error(transparent)]
+    Pixels(#[from] PixelError),
 }

@@ -1,16 +1,18 @@
 //! Depth cameras that speak UVC (Z16, Y16) through video nodes.
 //!
 //! - [`nodes`]: which nodes offer depth;
-//! - [`decode`]: buffer bytes to a depth image, pure;
-//! - [`calibration`]: the intrinsics file that such cameras need, since UVC does not carry any;
-//! - [`device`]: the [`toile_capture::Source`] over it all.
+//! - `calibration`: the intrinsics file that such cameras need, since UVC does not carry any;
+//! - `stream`, `numbering`: buffers to numbered frames;
+//! - [`UvcDepthCamera`]: the [`toile_capture::Source`] over it all.
 
-pub mod calibration;
-pub mod decode;
-pub mod device;
-pub mod error;
+mod calibration;
+mod device;
+mod error;
 pub mod nodes;
 mod numbering;
+mod settings;
+mod stream;
 
-pub use device::{Health, Settings, UvcDepthCamera};
+pub use device::UvcDepthCamera;
 pub use error::UvcDepthError;
+pub use settings::{Health, Settings};

@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn z16_is_preferred_and_colour_is_no_depth() {
+    fn z16_is_preferred_and_colour_is_not_depth() {
         let (z16, y16, yuyv) = (FourCc::Z16, FourCc::Y16, FourCc::YUYV);
         assert_eq!(depth_format(&[yuyv, y16, z16]), Some(z16));
         assert_eq!(depth_format(&[yuyv, y16]), Some(y16));

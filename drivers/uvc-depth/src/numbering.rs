@@ -18,7 +18,7 @@ struct Came {
 }
 
 impl Numbering {
-    /// The kernel counts anew from now on; the time until the next frame tells how many are lost.
+    /// The kernel counts anew from now on; the time until the next frame shows how many are lost.
     pub fn restart(&mut self) {
         self.last = self.last.map(|last| Came { sequence: None, ..last });
     }

@@ -8,11 +8,11 @@ use std::{
 };
 
 use toile_capture::{CaptureError, Frame, Source};
-use toile_driver_models::{
+use toile_driver_simulated::{
     d435::{self, Content, Pattern},
     uvc::{Fault, StreamFault, Wire},
 };
-use toile_driver_transport::{twin::VirtualBus, video::twin::VirtualVideo};
+use toile_driver_transport::simulated::{SimulatedBus, SimulatedVideo};
 use toile_driver_uvc_depth::{Settings, UvcDepthCamera, nodes};
 
 const CALIBRATION: &str = "name = \"model\"\ndepth_scale = 0.001\n[camera]\nwidth = 640\nheight = 480\nfx = 385.0\nfy = 385.0\ncx = 319.5\ncy = 239.5\n";
@@ -29,10 +29,10 @@ fn file(folder: &tempfile::TempDir, text: &str) -> PathBuf {
 
 /// The depth node of a D435 is a UVC depth camera as any other.
 fn camera(wire: Wire, faults: &[Fault]) -> UvcDepthCamera {
-    let bus = VirtualBus::default();
+    let bus = SimulatedBus::default();
     let model = d435::model(Pattern::default(), wire).with_faults(faults.iter().copied());
     bus.plug(Arc::new(Mutex::new(model)));
-    let video = VirtualVideo::new(bus);
+    let video = SimulatedVideo::new(bus);
     let node = nodes::list(&video)[0].node.clone();
     let folder = tempfile::tempdir().unwrap();
     UvcDepthCamera::open(&video, &node, &file(&folder, CALIBRATION), settings()).unwrap()
@@ -87,22 +87,22 @@ fn a_damaged_picture_is_a_lost_one_and_its_neighbours_are_whole() {
         let mut camera = camera(wire, &[fault(2, packet, what)]);
         let (frames, error) = take(&mut camera, 4);
         assert!(error.is_none(), "{what:?}: {error:?}");
-        let told: Vec<_> = frames.iter().map(|f| (f.device_frame, f.lost_before)).collect();
-        assert_eq!(told, [(0, 0), (1, 0), (3, 1), (4, 0)], "{wire:?} {what:?}");
+        let stated: Vec<_> = frames.iter().map(|f| (f.device_frame, f.lost_before)).collect();
+        assert_eq!(stated, [(0, 0), (1, 0), (3, 1), (4, 0)], "{wire:?} {what:?}");
         assert!(frames.iter().all(|f| is(f, f.device_frame)), "{what:?}");
         assert_eq!(camera.health().lost, 1);
     }
 }
 
 #[test]
-fn late_packets_are_no_loss() {
+fn late_packets_are_not_a_loss() {
     let mut camera = camera(Wire::Isochronous, &[fault(2, 30, StreamFault::Late(40))]);
     let (frames, _) = take(&mut camera, 5);
     assert!(frames.iter().zip(0..).all(|(f, k)| is(f, k) && f.lost_before == 0));
 }
 
 #[test]
-fn a_camera_that_falls_silent_is_woken_once_and_then_told() {
+fn a_camera_that_falls_silent_is_restarted_once_and_then_reported() {
     for (wire, what) in
         [(Wire::Isochronous, StreamFault::Silent), (Wire::Bulk, StreamFault::Silent), (Wire::Bulk, StreamFault::Stall)]
     {
@@ -110,8 +110,8 @@ fn a_camera_that_falls_silent_is_woken_once_and_then_told() {
         let (frames, error) = take(&mut woken, 6);
         assert!(error.is_none() && frames.len() == 6, "{what:?}: {error:?}");
         assert_eq!(woken.health().restarts, 1);
-        let told = frames.windows(2).map(|w| w[1].device_frame - w[0].device_frame - u64::from(w[1].lost_before));
-        assert!(told.into_iter().all(|step| step == 1), "{what:?}: numbers go on");
+        let stated = frames.windows(2).map(|w| w[1].device_frame - w[0].device_frame - u64::from(w[1].lost_before));
+        assert!(stated.into_iter().all(|step| step == 1), "{what:?}: numbers go on");
         let always: Vec<_> = (3..60).map(|frame| fault(frame, 4, what)).collect();
         let mut silent = camera(wire, &always);
         let (frames, error) = take(&mut silent, 6);
@@ -131,10 +131,10 @@ fn an_unplug_gives_all_whole_frames_then_one_error_then_the_end() {
 }
 
 #[test]
-fn a_node_without_depth_and_a_size_that_it_has_not_are_told() {
-    let bus = VirtualBus::default();
+fn a_node_without_depth_and_a_size_that_it_lacks_are_refused() {
+    let bus = SimulatedBus::default();
     bus.plug(Arc::new(Mutex::new(d435::model(Pattern::default(), Wire::Bulk))));
-    let video = VirtualVideo::new(bus);
+    let video = SimulatedVideo::new(bus);
     let folder = tempfile::tempdir().unwrap();
     let open = |node: &str, text: &str| {
         let opened = UvcDepthCamera::open(&video, node.as_ref(), &file(&folder, text), settings());

@@ -169,12 +169,15 @@ fn text(
 mod tests {
     use std::sync::{Arc, Mutex};
 
-    use toile_driver_models::{
+    use toile_driver_simulated::{
         d435,
         side_by_side::{self, Views},
         uvc::Wire,
     };
-    use toile_driver_transport::{LinkSpeed, twin::VirtualBus, video::twin::VirtualVideo};
+    use toile_driver_transport::{
+        LinkSpeed,
+        simulated::{SimulatedBus, SimulatedVideo},
+    };
 
     use super::*;
 
@@ -191,7 +194,7 @@ mod tests {
 
     #[test]
     fn every_camera_is_told_once_as_what_it_is() {
-        let bus = VirtualBus::default();
+        let bus = SimulatedBus::default();
         let d435 = bus.plug(Arc::new(Mutex::new(d435::model(d435::Pattern::default(), Wire::Bulk))));
         bus.plug(Arc::new(Mutex::new(side_by_side::model(Dark, Wire::Bulk))));
         let usb = UsbCamera {
@@ -204,7 +207,7 @@ mod tests {
         };
         // The system calls every node a webcam; a laptop's own is on no known device.
         let webcams = (0..9).map(|index| (index, format!("Node {index}"))).collect();
-        let answer = tell(Answer::default(), &[usb], webcams, &VirtualVideo::new(bus));
+        let answer = tell(Answer::default(), &[usb], webcams, &SimulatedVideo::new(bus));
         let lines: Vec<&str> = answer.text.lines().collect();
         let depth = "usb 001:001  RealSense D435 827313080543 (High speed): \
                      depth /dev/video0, infrared /dev/video2, colour /dev/video4";
@@ -217,11 +220,11 @@ mod tests {
 
     #[test]
     fn nothing_and_a_camera_that_lacks_a_node_are_said() {
-        let nothing = tell(Answer::default(), &[], Vec::new(), &VirtualVideo::new(VirtualBus::default()));
+        let nothing = tell(Answer::default(), &[], Vec::new(), &SimulatedVideo::new(SimulatedBus::default()));
         assert_eq!(nothing.text, "No camera is plugged in.\n");
-        let bus = VirtualBus::default();
+        let bus = SimulatedBus::default();
         bus.plug(Arc::new(Mutex::new(d435::d405(d435::Pattern::default(), Wire::Bulk))));
-        let mut camera = realsense::list(&VirtualVideo::new(bus)).unwrap().remove(0);
+        let mut camera = realsense::list(&SimulatedVideo::new(bus)).unwrap().remove(0);
         assert_eq!(missing_nodes(&camera), None);
         camera.depth = None;
         assert!(missing_nodes(&camera).unwrap().contains("no video node for depth"));

@@ -8,8 +8,8 @@ use std::{
 
 use toile_capture::{ColorImage, Frame};
 use toile_driver_kinect1::{Kinect1, Settings};
-use toile_driver_models::kinect1::{CameraModel, Content, Fault, Pattern, Stream, StreamFault};
-use toile_driver_transport::{DeviceInfo, twin::VirtualBus};
+use toile_driver_simulated::kinect1::{Content, Fault, Pattern, SimulatedCamera, Stream, StreamFault};
+use toile_driver_transport::{DeviceInfo, simulated::SimulatedBus};
 
 /// Quick to give up: 0.1 s of bus time without a frame, and of patience with commands.
 pub fn settings() -> Settings {
@@ -20,15 +20,15 @@ pub fn settings() -> Settings {
     }
 }
 
-pub fn plugged(model: CameraModel) -> (VirtualBus, DeviceInfo, Arc<Mutex<CameraModel>>) {
-    let (bus, model) = (VirtualBus::default(), Arc::new(Mutex::new(model)));
+pub fn plugged(model: SimulatedCamera) -> (SimulatedBus, DeviceInfo, Arc<Mutex<SimulatedCamera>>) {
+    let (bus, model) = (SimulatedBus::default(), Arc::new(Mutex::new(model)));
     let info = bus.plug(model.clone());
     (bus, info, model)
 }
 
 /// A Kinect before the pattern, with these faults.
 pub fn faulty(faults: &[Fault]) -> Kinect1 {
-    let model = CameraModel::new(Pattern::default()).with_faults(faults.iter().copied());
+    let model = SimulatedCamera::new(Pattern::default()).with_faults(faults.iter().copied());
     let (bus, ..) = plugged(model);
     Kinect1::open(&bus, None, settings()).unwrap()
 }

@@ -6,9 +6,9 @@
 use super::{COLUMNS, Row};
 
 /// Light counts as at least this when its spread is set in relation to it.
-const LEAST_LIGHT: f32 = 50.0;
+const MIN_LIGHT: f32 = 50.0;
 /// Light spreads by at least this part on an edge.
-const LEAST_SPREAD: f32 = 0.05;
+const MIN_SPREAD: f32 = 0.05;
 /// On an edge the nearest neighbour is nearer by more than this, the farthest farther, and one of them beyond the third;
 /// millimetres.
 const CLOSER: f32 = 50.0;
@@ -49,9 +49,9 @@ pub fn edge_row(rows: [&DepthRow; 3], out: &mut Row<f32>) {
                 farthest = if other > farthest { other } else { farthest };
             }
         }
-        let spread = (squares * 9.0 - sum * sum).max(0.0).sqrt() / (sum.max(9.0 * LEAST_LIGHT));
+        let spread = (squares * 9.0 - sum * sum).max(0.0).sqrt() / (sum.max(9.0 * MIN_LIGHT));
         let (closer, farther) = (depth - nearest, farthest - depth);
-        let is_edge = spread >= LEAST_SPREAD && closer > CLOSER && farther > FARTHER && closer.max(farther) > EITHER;
+        let is_edge = spread >= MIN_SPREAD && closer > CLOSER && farther > FARTHER && closer.max(farther) > EITHER;
         out[x] = if is_edge { 0.0 } else { here.smooth[x] };
     }
     for x in [0, COLUMNS - 1] {
@@ -82,7 +82,7 @@ mod tests {
     fn a_pixel_between_two_surfaces_is_dropped_where_light_jumps_too() {
         assert_eq!(between(1150.0, 0.5), 0.0);
         assert_eq!(between(1150.0, 1.0), 1150.0);
-        // Beside one of them it is no mix.
+        // Beside one of them it is not a mix.
         assert_eq!(between(1300.0, 0.5), 1300.0);
         assert_eq!(between(1040.0, 0.5), 1040.0);
     }

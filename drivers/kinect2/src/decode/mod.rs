@@ -9,24 +9,24 @@
 //! neither. Each step is plain arithmetic over rows, compiled for the vector units of the machine at hand; no
 //! multiplication is fused with an addition, so that the result is the same on every machine.
 
-pub mod curves;
-pub mod edges;
-pub mod lut;
-pub mod phasor;
-pub mod smooth;
-pub mod unwrap;
+mod curves;
+mod edges;
+mod lut;
+mod phasor;
+mod smooth;
+mod unwrap;
 
-use crate::{Kinect2Error, calibration::Calibration};
+use crate::{
+    Kinect2Error,
+    calibration::Calibration,
+    size::{COLUMNS, ROWS},
+};
 use edges::{DepthRow, edge_row};
 use lut::{ROW_BYTES, unpack_row};
 use phasor::{PhasorRow, phasor_row};
 use smooth::smooth_row;
 use unwrap::{Distances, unwrap_row};
 
-/// Columns of depth and infrared.
-pub const COLUMNS: usize = 512;
-/// Rows of depth and infrared.
-pub const ROWS: usize = 424;
 /// Bytes of one of a packet's ten images.
 pub const IMAGE_BYTES: usize = ROWS * ROW_BYTES;
 /// Bytes of a packet.
@@ -43,9 +43,9 @@ const P0_UNIT: f64 = -0.000_031 * std::f64::consts::PI;
 const UNIT_MM: f64 = 6250.0 / 3.0;
 /// Strength of the parallax between light and lens, millimetres (libfreenect2 `processPixelStage2`).
 const PARALLAX: f64 = 90.0;
-/// Infrared is told as so many times a third of the light (libfreenect2 `ab_output_multiplier`), and at most as this.
+/// Infrared is given as this many times a third of the light (libfreenect2 `ab_output_multiplier`), and at most as this.
 const INFRARED_GAIN: f32 = 16.0 / 3.0;
-const MOST_INFRARED: f32 = 65_535.0;
+const MAX_INFRARED: f32 = 65_535.0;
 
 /// What is dropped.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -170,7 +170,7 @@ fn measure(rows: &[[u8; ROW_BYTES]], y: usize, tables: &Tables, out: &mut [Phaso
         }
         phasor_row(&measured, (&tables.cos[frequency][y], &tables.sin[frequency][y]), out, infrared);
     }
-    infrared.iter_mut().for_each(|light| *light = (*light * INFRARED_GAIN).min(MOST_INFRARED));
+    infrared.iter_mut().for_each(|light| *light = (*light * INFRARED_GAIN).min(MAX_INFRARED));
 }
 
 #[inline(always)]
@@ -206,15 +206,15 @@ fn finish(y: usize, settings: DecodeSettings, rows: &[DepthRow; 3], out: &mut Ro
     } else {
         *out = rows[y % 3].smooth;
     }
-    let (least, most) = (settings.min_depth * 1000.0, settings.max_depth * 1000.0);
+    let (min, max) = (settings.min_depth * 1000.0, settings.max_depth * 1000.0);
     for depth in out.iter_mut() {
-        *depth = if *depth >= least && *depth <= most { *depth } else { 0.0 };
+        *depth = if *depth >= min && *depth <= max { *depth } else { 0.0 };
     }
 }
 
 impl Tables {
     fn new(calibration: &Calibration) -> Self {
-        // P0 is told mirrored, as the sensor sees.
+        // P0 is stated mirrored, as the sensor sees.
         let mirrored = |i: usize| i - i % COLUMNS + COLUMNS - 1 - i % COLUMNS;
         // P0 has fewer values than the image has pixels.
         let turns: Vec<(f64, f64)> = (0..=u16::MAX).map(|p0| (P0_UNIT * f64::from(p0)).sin_cos()).collect();

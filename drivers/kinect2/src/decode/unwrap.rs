@@ -14,8 +14,8 @@ use super::{
 };
 
 /// Least light of one frequency, and of all three together.
-const LEAST_LIGHT: f32 = 3.0;
-const LEAST_SUM: f32 = 10.0;
+const MIN_LIGHT: f32 = 3.0;
+const MIN_SUM: f32 = 10.0;
 /// The more light, the better the three must fit: at most e^(a + b · ln light) apart, between two bounds
 /// (`ab_confidence_offset` times 3.321928, `ab_confidence_slope`, `min_dealias_confidence`, `max_dealias_confidence`).
 const MISFIT_OFFSET: f32 = 0.769_489_4 * std::f32::consts::LOG2_10;
@@ -40,13 +40,13 @@ pub fn unwrap_row(a: &[Row<f32>; 3], b: &[Row<f32>; 3], out: Distances<'_>) {
         let delay = [angle(a[0], b[0]), angle(a[1], b[1]), angle(a[2], b[2])];
         let light = [length(a[0], b[0]), length(a[1], b[1]), length(a[2], b[2])];
         let sum = light[0] + light[1] + light[2];
-        let (least, most) = (light[0].min(light[1]).min(light[2]), light[0].max(light[1]).max(light[2]));
+        let (min, max) = (light[0].min(light[1]).min(light[2]), light[0].max(light[1]).max(light[2]));
         let (mean, misfit) = unwrap(delay);
         // ln of nothing is never asked for: what is too dark is dropped anyway.
         let most_misfit =
-            (exp(MISFIT_OFFSET + MISFIT_SLOPE * ln(most.max(1.0)) - 3.0) * E_CUBED).clamp(MISFIT[0], MISFIT[1]);
+            (exp(MISFIT_OFFSET + MISFIT_SLOPE * ln(max.max(1.0)) - 3.0) * E_CUBED).clamp(MISFIT[0], MISFIT[1]);
         let fits = misfit <= most_misfit * most_misfit && mean >= 0.0;
-        let bright = least >= LEAST_LIGHT && sum >= LEAST_SUM;
+        let bright = min >= MIN_LIGHT && sum >= MIN_SUM;
         out.range[x] = if fits && bright { mean } else { 0.0 };
         out.light[x] = sum;
     }

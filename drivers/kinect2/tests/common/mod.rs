@@ -11,8 +11,8 @@ use std::{
 
 use toile_capture::{ColorImage, Frame};
 use toile_driver_kinect2::{ColorMode, DecodeSettings, Decoder, Kinect2, Settings, color};
-use toile_driver_models::kinect2::{CameraModel, Content, Fault, Pattern, Stream, StreamFault};
-use toile_driver_transport::{DeviceInfo, twin::VirtualBus};
+use toile_driver_simulated::kinect2::{Content, Fault, Pattern, SimulatedCamera, Stream, StreamFault};
+use toile_driver_transport::{DeviceInfo, simulated::SimulatedBus};
 
 /// One pattern for all tests, computed once.
 pub static PATTERN: LazyLock<Pattern> = LazyLock::new(Pattern::default);
@@ -32,15 +32,15 @@ pub fn settings() -> Settings {
     }
 }
 
-pub fn plugged(model: CameraModel) -> (VirtualBus, DeviceInfo, Arc<Mutex<CameraModel>>) {
-    let (bus, model) = (VirtualBus::default(), Arc::new(Mutex::new(model)));
+pub fn plugged(model: SimulatedCamera) -> (SimulatedBus, DeviceInfo, Arc<Mutex<SimulatedCamera>>) {
+    let (bus, model) = (SimulatedBus::default(), Arc::new(Mutex::new(model)));
     let info = bus.plug(model.clone());
     (bus, info, model)
 }
 
 /// A Kinect before the pattern, with these faults.
 pub fn faulty(faults: &[Fault]) -> Kinect2 {
-    let (bus, ..) = plugged(CameraModel::new(PATTERN.clone()).with_faults(faults.iter().copied()));
+    let (bus, ..) = plugged(SimulatedCamera::new(PATTERN.clone()).with_faults(faults.iter().copied()));
     Kinect2::open(&bus, None, settings()).unwrap()
 }
 

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use toile_driver_kinect2::Calibration;
-use toile_driver_models::kinect2::{
+use toile_driver_simulated::kinect2::{
     Content, Optics, Pattern, Rendered,
     phases::{self, Seen},
 };

@@ -7,12 +7,15 @@ use std::{
 };
 
 use toile_capture::{ColorImage, Frame};
-use toile_driver_models::{
-    d435::{self, Content, D435, Pattern},
-    uvc::{Fault, StreamFault, UvcModel, Wire},
-};
 use toile_driver_realsense::{Realsense, Settings};
-use toile_driver_transport::{DeviceInfo, twin::VirtualBus, video::twin::VirtualVideo};
+use toile_driver_simulated::{
+    d435::{self, Content, D435, Pattern},
+    uvc::{Fault, SimulatedCamera, StreamFault, Wire},
+};
+use toile_driver_transport::{
+    DeviceInfo,
+    simulated::{SimulatedBus, SimulatedVideo},
+};
 
 pub const SIZE: (u16, u16) = (640, 480);
 
@@ -21,20 +24,20 @@ pub fn settings() -> Settings {
     Settings { frame_limit: Duration::from_millis(200), ..Settings::default() }
 }
 
-pub fn plugged(model: UvcModel<D435>) -> (VirtualBus, DeviceInfo, Arc<Mutex<UvcModel<D435>>>) {
-    let (bus, model) = (VirtualBus::default(), Arc::new(Mutex::new(model)));
+pub fn plugged(model: SimulatedCamera<D435>) -> (SimulatedBus, DeviceInfo, Arc<Mutex<SimulatedCamera<D435>>>) {
+    let (bus, model) = (SimulatedBus::default(), Arc::new(Mutex::new(model)));
     let info = bus.plug(model.clone());
     (bus, info, model)
 }
 
-pub fn pattern(wire: Wire) -> UvcModel<D435> {
+pub fn pattern(wire: Wire) -> SimulatedCamera<D435> {
     d435::model(Pattern::default(), wire)
 }
 
 /// A camera before the pattern, with these faults.
 pub fn faulty(wire: Wire, faults: &[Fault]) -> Realsense {
     let (bus, ..) = plugged(pattern(wire).with_faults(faults.iter().copied()));
-    Realsense::open(&VirtualVideo::new(bus), None, settings()).unwrap()
+    Realsense::open(&SimulatedVideo::new(bus), None, settings()).unwrap()
 }
 
 pub fn depth_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {

@@ -12,16 +12,9 @@ use rusb::{Context, DeviceHandle};
 
 use super::{
     event_loop::EventLoop,
-    transfer::{Flights, submit},
+    transfer::{Shared, submit},
 };
 use crate::{DeviceInfo, Setup, Transfer, TransferKind, TransferStatus, TransportError, UsbDevice};
-
-/// What transfers in flight keep alive: the handle first, then the thread that finishes them.
-pub(super) struct Shared {
-    pub(super) handle: DeviceHandle<Context>,
-    pub(super) flights: Flights,
-    _events: Arc<EventLoop>,
-}
 
 /// How long dropping a device waits for its transfers.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -41,7 +34,7 @@ impl LibusbDevice {
         let descriptor = handle.device().device_descriptor();
         let serial = descriptor.and_then(|d| handle.read_serial_number_string_ascii(&d)).unwrap_or_default();
         let (to_done, done) = mpsc::channel();
-        let shared = Arc::new(Shared { handle, flights: Flights::default(), _events: events });
+        let shared = Arc::new(Shared::new(handle, events));
         Self { shared, info, serial, done, to_done, gone: false }
     }
 
@@ -185,7 +178,7 @@ mod tests {
     #[test]
     fn room_of_packets_by_the_descriptors() {
         assert_eq!(packet_room(0x0bc0, &[]), 1920);
-        // Eleven bursts of three times 1024 bytes, as the Kinect v2 tells.
+        // Eleven bursts of three times 1024 bytes, as the Kinect v2 states.
         assert_eq!(packet_room(1024, &[6, 0x30, 10, 2, 0x00, 0x84]), 33_792);
         assert_eq!(packet_room(1024, &[3, 0x24, 9, 6, 0x30, 0, 0, 0, 4]), 1024);
         for broken in [&[6, 0x30, 10][..], &[0, 0, 0], &[0]] {

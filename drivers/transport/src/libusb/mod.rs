@@ -3,7 +3,7 @@
 //! A thread of its own (`event_loop`) takes finished transfers from the kernel; [`device::LibusbDevice`] is an open
 //! device; `transfer` is the crate's only unsafe code.
 
-pub mod device;
+mod device;
 mod event_loop;
 #[allow(unsafe_code)]
 mod transfer;

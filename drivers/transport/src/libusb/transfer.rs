@@ -18,6 +18,7 @@ use std::{
 };
 
 use rusb::{
+    Context, DeviceHandle,
     constants::{
         LIBUSB_TRANSFER_CANCELLED, LIBUSB_TRANSFER_COMPLETED, LIBUSB_TRANSFER_NO_DEVICE, LIBUSB_TRANSFER_OVERFLOW,
         LIBUSB_TRANSFER_STALL, LIBUSB_TRANSFER_TYPE_BULK, LIBUSB_TRANSFER_TYPE_ISOCHRONOUS,
@@ -27,11 +28,24 @@ use rusb::{
     },
 };
 
-use super::device::Shared;
-use crate::{PacketStatus, Transfer, TransferKind, TransferStatus, transfer::PacketResult};
+use super::event_loop::EventLoop;
+use crate::{PacketStatus, Transfer, TransferKind, TransferStatus, usb::PacketResult};
 
 /// What Linux says where `usbcore.usbfs_memory_mb` is used up.
 const ENOMEM: i32 = 12;
+
+/// What transfers in flight keep alive: the handle first, then the thread that finishes them.
+pub(super) struct Shared {
+    pub(super) handle: DeviceHandle<Context>,
+    pub(super) flights: Flights,
+    _events: Arc<EventLoop>,
+}
+
+impl Shared {
+    pub(super) fn new(handle: DeviceHandle<Context>, events: Arc<EventLoop>) -> Self {
+        Self { handle, flights: Flights::default(), _events: events }
+    }
+}
 
 /// The transfers of a device that are in flight.
 #[derive(Default)]
@@ -123,7 +137,7 @@ pub(super) fn submit(shared: &Arc<Shared>, transfer: Transfer, done: Sender<Tran
     match unsafe { libusb_submit_transfer(pointer.as_ptr()) } {
         0 => Ok(()),
         code => {
-            // libusb tells one error for all that the kernel says.
+            // libusb reports one error for everything that the kernel says.
             let says_no_memory = io::Error::last_os_error().raw_os_error() == Some(ENOMEM);
             shared.flights.remove(number);
             // SAFETY: the submission failed, so no callback will run and both are ours again.

@@ -21,8 +21,13 @@ use v4l::{
     video::{Capture, capture::Parameters},
 };
 
-use super::{FourCc, NodeInfo, PictureLayout, Video, VideoBuffer, VideoNode, mapped::Mapped, sysfs};
-use crate::{TransportError, udev};
+use super::{
+    format::{FourCc, PictureLayout},
+    mapped::Mapped,
+    node::{NodeInfo, Video, VideoBuffer, VideoNode},
+    sysfs,
+};
+use crate::{TransportError, udev::advice};
 
 /// V4L2_BUF_TYPE_VIDEO_CAPTURE and _META_CAPTURE; V4L2_CAP_META_CAPTURE.
 const VIDEO_CAPTURE: u32 = 1;
@@ -34,7 +39,6 @@ const GET_CUR: u8 = 0x81;
 /// `_IOWR('u', 0x21, struct uvc_xu_control_query)` with its 16 bytes.
 const UVCIOC_CTRL_QUERY: vidioc::_IOC_TYPE = (3 << 30) | (16 << 16) | (0x75 << 8) | 0x21;
 /// Errors as Linux numbers them.
-const ENODEV: i32 = 19;
 const EPIPE: i32 = 32;
 const EREMOTEIO: i32 = 121;
 
@@ -72,7 +76,7 @@ impl Video for KernelVideo {
         };
         match KernelNode::open(node) {
             Err(TransportError::Video { source, .. }) if source.kind() == io::ErrorKind::PermissionDenied => {
-                Err(TransportError::NodePermission { node: node.into(), advice: udev::advice(vendor()) })
+                Err(TransportError::NodePermission { node: node.into(), advice: advice(vendor()) })
             }
             other => Ok(Box::new(other?)),
         }
@@ -219,16 +223,6 @@ impl VideoNode for KernelNode {
 
     fn extension_set(&mut self, unit: u8, selector: u8, data: &[u8]) -> Result<(), TransportError> {
         self.extension(unit, selector, SET_CUR, &mut data.to_vec())
-    }
-}
-
-impl TransportError {
-    /// Sorts an error of a video node into what a caller can act on.
-    pub(crate) fn from_video(node: &Path, action: &'static str, source: io::Error) -> Self {
-        match source.raw_os_error() {
-            Some(ENODEV) => Self::Unplugged,
-            _ => Self::Video { node: node.into(), action, source },
-        }
     }
 }
 

@@ -21,7 +21,7 @@ use v4l::{
     v4l2::{self, vidioc},
 };
 
-use super::VideoBuffer;
+use super::node::VideoBuffer;
 
 /// V4L2_MEMORY_MMAP, V4L2_BUF_FLAG_ERROR (`linux/videodev2.h`).
 const MEMORY_MMAP: u32 = 1;
@@ -70,7 +70,7 @@ impl Mapped {
             let milliseconds = i32::try_from(left.as_millis()).unwrap_or(i32::MAX);
             match self.handle.poll(POLLIN, milliseconds) {
                 Ok(0) => return Err(io::ErrorKind::TimedOut.into()),
-                // A signal (Ctrl-C is one) is no end of the stream.
+                // A signal (Ctrl-C is one) does not end the stream.
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
                 ready => ready?,
             };

@@ -5,14 +5,14 @@
 
 use std::{fs, path::Path};
 
-use super::{NodeInfo, UsbPlace};
+use super::node::{NodeInfo, UsbPlace};
 use crate::{LinkSpeed, TransportError};
 
-/// The nodes below a sysfs root, in the order of their numbers. No such class at all is no node.
+/// The nodes below a sysfs root, in the order of their numbers. Where there is no such class, there are no nodes.
 ///
 /// # Errors
 /// [`TransportError::Video`] where the folder is there and cannot be read.
-pub fn nodes(sysfs: &Path) -> Result<Vec<NodeInfo>, TransportError> {
+pub(super) fn nodes(sysfs: &Path) -> Result<Vec<NodeInfo>, TransportError> {
     let folder = sysfs.join("class/video4linux");
     let entries = match fs::read_dir(&folder) {
         Ok(entries) => entries,

@@ -1,0 +1,7 @@
+//! What all cameras that stream have in common: how they are driven and restarted, and how their frames are numbered.
+
+mod driver;
+mod numbering;
+
+pub use driver::{Progress, Streaming, Streams};
+pub use numbering::Numbering;

@@ -1,0 +1,94 @@
+//! Pictures of a colour source with their host times: read by a thread as they come, or on demand.
+
+use std::{
+    sync::mpsc::{self, Receiver, TryRecvError, TrySendError},
+    thread,
+};
+
+use toile_capture::{CaptureError, ColorImage, Frame, Source};
+
+/// Pictures that may wait to be taken; while more come, depth has stalled, and they are of no use.
+const ROOM: usize = 32;
+
+/// A picture and its host time (nanoseconds since the Unix epoch), or the end, or what went wrong.
+type Next = Result<Option<(i64, ColorImage)>, CaptureError>;
+
+/// Where pictures come from.
+pub(crate) enum Feed {
+    /// A thread that reads a camera; it ends with the camera, or when its next picture finds nobody who takes it.
+    Live(Receiver<Next>),
+    /// A recording.
+    OnDemand { source: Box<dyn Source>, is_host_time: bool },
+    /// Nothing more comes.
+    Ended,
+}
+
+impl Feed {
+    /// Pictures of `source`; `is_host_time`: its device times are of the host's wall clock, nearer to the exposure than
+    /// the time of arrival.
+    pub(crate) fn new(source: Box<dyn Source>, is_host_time: bool, is_live: bool) -> Self {
+        if !is_live {
+            return Self::OnDemand { source, is_host_time };
+        }
+        let (sender, receiver) = mpsc::sync_channel(ROOM);
+        let read = move || {
+            let mut source = source;
+            loop {
+                let next = next_picture(&mut *source, is_host_time);
+                let is_last = !matches!(next, Ok(Some(_)));
+                // The end must arrive; a picture for which there is no room need not.
+                let sent = if is_last { sender.send(next).map_err(drop) } else { offer(&sender, next) };
+                if is_last || sent.is_err() {
+                    return;
+                }
+            }
+        };
+        match thread::Builder::new().name("webcam".into()).spawn(read) {
+            Ok(_) => Self::Live(receiver),
+            Err(error) => {
+                tracing::warn!(%error, "no thread for the webcam's pictures: depth is without colour");
+                Self::Ended
+            }
+        }
+    }
+
+    /// The next picture that is here; on demand: where it is `wanted`. `Ok(None)` comes once, at the end.
+    pub(crate) fn next(&mut self, wanted: bool) -> Option<Next> {
+        let next = match self {
+            Self::Live(receiver) => match receiver.try_recv() {
+                Ok(next) => next,
+                Err(TryRecvError::Empty) => return None,
+                Err(TryRecvError::Disconnected) => Ok(None),
+            },
+            Self::OnDemand { source, is_host_time } if wanted => next_picture(&mut **source, *is_host_time),
+            Self::OnDemand { .. } => return None,
+            Self::Ended => return None,
+        };
+        if !matches!(next, Ok(Some(_))) {
+            *self = Self::Ended;
+        }
+        Some(next)
+    }
+}
+
+fn offer(sender: &mpsc::SyncSender<Next>, next: Next) -> Result<(), ()> {
+    match sender.try_send(next) {
+        Ok(()) | Err(TrySendError::Full(_)) => Ok(()),
+        Err(TrySendError::Disconnected(_)) => Err(()),
+    }
+}
+
+/// The next frame of the first sensor that has colour. A frame that cannot be read is passed over.
+fn next_picture(source: &mut dyn Source, is_host_time: bool) -> Next {
+    loop {
+        match source.next_frame() {
+            Ok(Some(Frame { sensor: 0, color: Some(color), device_time_ns, host_time_ns, .. })) => {
+                return Ok(Some((if is_host_time { device_time_ns } else { host_time_ns }, color)));
+            }
+            Ok(None) => return Ok(None),
+            Ok(Some(_)) => {}
+            Err(CaptureError::Frame { index, reason }) => tracing::warn!(index, reason, "a picture is passed over"),
+            Err(error) => return Err(error),
+        }
+    }
+}
