@@ -220,7 +220,7 @@ mod tests {
             ("D1: !!", "E1: !!", "no matrix D1"),
             ("[ 5e2, 0e0, 3.2e2", "[ -5e2, 0e0, 3.2e2", "M1"),
             ("[ 5e2, 0e0, 3.2e2", "[ 5e2, 3e0, 3.2e2", "skew"),
-            ("[ 1e0, 0e0, 0e0, 0e0, 1e0", "[ 1e0, 0e0, 0e0, 0e0, 2e0", "no rotation"),
+            ("[ 1e0, 0e0, 0e0, 0e0, 1e0", "[ 1e0, 0e0, 0e0, 0e0, 2e0", "not a rotation"),
             (
                 "rows: 3\n   cols: 1\n   dt: d\n   data: [ -1.2e2, 0e0, 0e0 ]",
                 "rows: 2\n   cols: 1\n   dt: d\n   data: [ 1, 2 ]",

@@ -25,7 +25,7 @@ pub struct FileStorage {
     pub numbers: BTreeMap<String, f64>,
 }
 
-/// Most numbers that a calibration's matrix may have; per-view tables of long calibrations have thousands.
+/// The largest count of numbers that a calibration's matrix may have; per-view tables of long calibrations have thousands.
 const MAX_NUMBERS: usize = 1_000_000;
 
 /// Reads the text of a file.

@@ -23,29 +23,26 @@
 //! # }
 //! ```
 
-pub mod calibration;
+mod calibration;
 mod census;
-pub mod depth;
-pub mod error;
+mod depth;
+mod error;
 pub mod file_storage;
-pub mod image;
-mod lanes;
-#[cfg(target_arch = "x86_64")]
-mod lanes_avx2;
-pub mod lens;
-pub mod matcher;
+mod image;
+mod lens;
+mod matcher;
 mod median;
 mod path;
-pub mod rectification;
-pub mod remap;
+mod rectification;
+mod remap;
 mod row;
-pub mod settings;
+mod settings;
 mod speckle;
 #[cfg(test)]
 mod testing;
 mod winner;
 
-pub use calibration::{GivenRectification, StereoCalibration, read_calibration};
+pub use calibration::{GivenRectification, StereoCalibration, calibration_of, read_calibration};
 pub use depth::{DepthFromPair, DepthSettings, PairDepth};
 pub use error::StereoError;
 pub use image::{GrayImage, luma};

@@ -1,14 +1,9 @@
 //! Semi-global matching of a rectified pair (Hirschmüller 2008) on census costs.
 
 use rayon::prelude::*;
+use toile_geometry::lanes::bytes::{Kernel, LANES, Lanes, dispatch};
 
-use crate::{
-    GrayImage, MatchSettings, StereoError, census,
-    lanes::{LANES, Lanes, Portable},
-    median::median,
-    row::RowMatcher,
-    speckle::remove_speckles,
-};
+use crate::{GrayImage, MatchSettings, StereoError, census, median::median, row::RowMatcher, speckle::remove_speckles};
 
 /// Rows of a strip. Strips are matched apart, so that threads can share them; their size is fixed, so that the result
 /// does not depend on the threads.
@@ -38,35 +33,13 @@ pub struct DisparityMap {
 /// # Errors
 /// [`StereoError::Images`] where the images differ in size, [`StereoError::Settings`] where a setting is out of range.
 pub fn match_pair(left: &GrayImage, right: &GrayImage, settings: &MatchSettings) -> Result<DisparityMap, StereoError> {
-    match_with(left, right, settings, Machine::best(), STRIP_ROWS)
-}
-
-/// Which vector operations to use.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Machine {
-    /// Those of AVX2, with the proof that this processor has them.
-    #[cfg(target_arch = "x86_64")]
-    Avx2(pulp::x86::V3),
-    /// Plain Rust.
-    Portable,
-}
-
-impl Machine {
-    /// The best that this processor has.
-    pub(crate) fn best() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(simd) = pulp::x86::V3::try_new() {
-            return Self::Avx2(simd);
-        }
-        Self::Portable
-    }
+    match_with(left, right, settings, STRIP_ROWS)
 }
 
 pub(crate) fn match_with(
     left: &GrayImage,
     right: &GrayImage,
     settings: &MatchSettings,
-    machine: Machine,
     strip_rows: usize,
 ) -> Result<DisparityMap, StereoError> {
     if (left.width, left.height) != (right.width, right.height) || !left.is_valid() || !right.is_valid() {
@@ -78,7 +51,7 @@ pub(crate) fn match_with(
     let mut values = vec![0.0; w * h];
     values.par_chunks_mut(w * strip_rows).enumerate().for_each(|(i, out)| {
         let first = i * strip_rows;
-        dispatch(Strip { left, right, settings, first, lead: LEAD_ROWS.min(first), out }, machine);
+        match_strip(Strip { left, right, settings, first, lead: LEAD_ROWS.min(first), out });
     });
     if settings.median {
         values = median(&values, w);
@@ -97,66 +70,50 @@ struct Strip<'a> {
     out: &'a mut [f32],
 }
 
-/// Chooses the code compiled for the number of disparities.
-fn dispatch(strip: Strip<'_>, machine: Machine) {
+/// Chooses the code compiled for the number of disparities, and for this processor.
+fn match_strip(strip: Strip<'_>) {
     match (strip.settings.disparities as usize).div_ceil(LANES) {
-        0..=1 => run::<1>(strip, machine),
-        2 => run::<2>(strip, machine),
-        3 => run::<3>(strip, machine),
-        4 => run::<4>(strip, machine),
-        5..=6 => run::<6>(strip, machine),
-        _ => run::<8>(strip, machine),
+        0..=1 => dispatch(MatchRows::<1>(strip)),
+        2 => dispatch(MatchRows::<2>(strip)),
+        3 => dispatch(MatchRows::<3>(strip)),
+        4 => dispatch(MatchRows::<4>(strip)),
+        5..=6 => dispatch(MatchRows::<6>(strip)),
+        _ => dispatch(MatchRows::<8>(strip)),
     }
 }
 
-/// Chooses the code compiled for this processor.
-fn run<const N: usize>(strip: Strip<'_>, machine: Machine) {
-    match machine {
-        #[cfg(target_arch = "x86_64")]
-        Machine::Avx2(simd) => simd.vectorize(WithAvx2::<N> { simd, strip }),
-        Machine::Portable => match_rows::<_, N>(Portable, strip),
-    }
-}
+/// Matches the rows of a strip with `N` vectors of disparities a pixel.
+struct MatchRows<'a, const N: usize>(Strip<'a>);
 
-#[cfg(target_arch = "x86_64")]
-struct WithAvx2<'a, const N: usize> {
-    simd: pulp::x86::V3,
-    strip: Strip<'a>,
-}
-
-#[cfg(target_arch = "x86_64")]
-impl<const N: usize> pulp::NullaryFnOnce for WithAvx2<'_, N> {
+impl<const N: usize> Kernel for MatchRows<'_, N> {
     type Output = ();
 
+    /// One row after the other. Everything below is inlined into one function, so that all of it is compiled for the
+    /// processor it was chosen for.
     #[inline(always)]
-    fn call(self) {
-        match_rows::<_, N>(self.simd, self.strip);
-    }
-}
-
-/// Matches the rows of a strip, one after the other. Everything below is inlined into one function, so that all of it is
-/// compiled for the processor it was chosen for.
-#[inline(always)]
-fn match_rows<L: Lanes, const N: usize>(lanes: L, strip: Strip<'_>) {
-    let Strip { left, right, settings, first, lead, out } = strip;
-    let w = left.width as usize;
-    let rows = first - lead..first + out.len() / w;
-    let margin = settings.min_disparity as usize + N * LANES;
-    let left = census::transform(left, rows.clone(), false, 0);
-    let right = census::transform(right, rows.clone(), true, margin);
-    let mut matcher = RowMatcher::<N>::new(w, settings);
-    for v in 0..rows.len() {
-        matcher.match_row(lanes, &left, &right, v);
-        matcher.aggregate_row(lanes);
-        matcher.select_row(lanes);
-        if v >= lead {
-            matcher.answer(&mut out[(v - lead) * w..][..w]);
+    fn run<L: Lanes>(self, lanes: L) {
+        let Strip { left, right, settings, first, lead, out } = self.0;
+        let w = left.width as usize;
+        let rows = first - lead..first + out.len() / w;
+        let margin = settings.min_disparity as usize + N * LANES;
+        let left = census::transform(left, rows.clone(), false, 0);
+        let right = census::transform(right, rows.clone(), true, margin);
+        let mut matcher = RowMatcher::<N>::new(w, settings);
+        for v in 0..rows.len() {
+            matcher.match_row(lanes, &left, &right, v);
+            matcher.aggregate_row(lanes);
+            matcher.select_row(lanes);
+            if v >= lead {
+                matcher.answer(&mut out[(v - lead) * w..][..w]);
+            }
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use toile_geometry::lanes::bytes::Portable;
+
     use super::*;
     use crate::testing::{brute_force, noise, shifted};
 
@@ -177,16 +134,29 @@ mod tests {
         }
     }
 
+    /// The rows of one strip by the best lanes of this machine and by plain Rust.
+    fn both_ways<const N: usize>(disparities: u32) {
+        let left = noise(150, 30, u64::from(disparities));
+        let right = shifted(&left, 13, 5);
+        let settings = &MatchSettings { disparities, ..MatchSettings::default() };
+        let with = |run: fn(MatchRows<'_, N>)| {
+            let mut out = vec![0.0; 150 * 22];
+            run(MatchRows(Strip { left: &left, right: &right, settings, first: 8, lead: 8, out: &mut out }));
+            out
+        };
+        let best = with(|rows| dispatch(rows));
+        assert_eq!(best, with(|rows| rows.run(Portable)), "{disparities}");
+        assert!(best.iter().filter(|d| **d > 0.0).count() > 1000);
+    }
+
     #[test]
     fn every_machine_gives_the_same_bits() {
-        for count in [32, 64, 96, 128, 192, 256] {
-            let left = noise(150, 30, u64::from(count));
-            let right = shifted(&left, 13, 5);
-            let settings = MatchSettings { disparities: count, ..MatchSettings::default() };
-            let best = match_with(&left, &right, &settings, Machine::best(), STRIP_ROWS).unwrap();
-            let portable = match_with(&left, &right, &settings, Machine::Portable, STRIP_ROWS).unwrap();
-            assert_eq!(best, portable, "{count}");
-        }
+        both_ways::<1>(32);
+        both_ways::<2>(64);
+        both_ways::<3>(96);
+        both_ways::<4>(128);
+        both_ways::<6>(192);
+        both_ways::<8>(256);
     }
 
     #[test]
@@ -200,7 +170,7 @@ mod tests {
         };
         let (one, four) = (with(1), with(4));
         assert_eq!(one, four);
-        let whole = match_with(&left, &right, &settings, Machine::best(), 10_000).unwrap();
+        let whole = match_with(&left, &right, &settings, 10_000).unwrap();
         let other = one.values.iter().zip(&whole.values).filter(|(a, b)| (*a - *b).abs() > 0.25).count();
         assert!(other * 500 < whole.values.len(), "{other} pixels differ from matching without strips");
     }

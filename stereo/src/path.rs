@@ -1,6 +1,6 @@
 //! Path costs of semi-global matching (Hirschmüller 2008, eq. 13): what a disparity costs along one direction.
 
-use crate::lanes::{LANES, Lanes};
+use toile_geometry::lanes::bytes::{LANES, Lanes};
 
 /// What a vector of path costs has before its first and after its last disparity: a sentinel that never wins.
 pub(crate) const SENTINELS: usize = 2;

@@ -5,7 +5,7 @@ use toile_geometry::camera::PinholeCamera;
 
 use crate::{GivenRectification, Lens, StereoCalibration, StereoError};
 
-/// Two rectified views: the same ideal camera at two places, so that what is at infinity has disparity 0.
+/// Two rectified views: the same ideal camera at two places, so that points at infinity have disparity 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rectification {
     /// The camera of both rectified views.
@@ -27,7 +27,7 @@ pub struct View {
     pub rectified_from_camera: Matrix3<f64>,
 }
 
-/// Points along an edge of the image by which [`rectify`] tells how much of it is kept; OpenCV's number.
+/// Points along an edge of the image by which [`rectify`] decides how much of it is kept; OpenCV's number.
 const GRID: usize = 9;
 
 /// Rectifies images of `size` (columns, rows).
@@ -91,7 +91,7 @@ fn bouguet(c: &StereoCalibration, size: (u32, u32), alpha: Option<f64>) -> Resul
 /// `t` is the left camera's place in the right camera's frame, turned half of the way.
 fn check_baseline(t: Vector3<f64>) -> Result<(), String> {
     if t.y.abs() > t.x.abs() {
-        return Err("they stand above each other; turn both images by 90 degrees and calibrate again".into());
+        return Err("the cameras are above each other; turn both images by 90 degrees and calibrate again".into());
     }
     if t.x >= 0.0 || !t.x.is_finite() {
         return Err(format!(

@@ -1,8 +1,9 @@
 //! One row at a time: matching costs, path costs, the winners and what speaks against them.
 
+use toile_geometry::lanes::bytes::{LANES, Lanes};
+
 use crate::{
     census::{BITS, Census, PLANES},
-    lanes::{LANES, Lanes},
     path::{PathRow, Penalties, step},
     settings::MatchSettings,
     winner::{Winner, winner},

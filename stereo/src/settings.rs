@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{StereoError, census::BITS, path::Penalties};
 
-/// Most disparities that one search may cover.
+/// The largest number of disparities that one search may cover.
 pub const MAX_DISPARITIES: u32 = 256;
 
 /// How two rectified images are matched.
@@ -27,7 +27,7 @@ pub struct MatchSettings {
     pub uniqueness: f32,
     /// How far the disparity found from the right image may be off, pixels; default 1. Occluded pixels fail here.
     pub left_right: u32,
-    /// Islands of fewer pixels are not answered; default 100, 0 keeps all.
+    /// Islands of fewer pixels than this are not answered; default 100, 0 keeps all.
     pub speckle_area: u32,
     /// Neighbours whose disparities differ by less belong to one island, pixels; default 1.
     pub speckle_step: f32,

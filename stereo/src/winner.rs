@@ -1,6 +1,6 @@
 //! The disparity of the smallest sum, its fraction, and whether another comes close.
 
-use crate::lanes::{LANES, Lanes};
+use toile_geometry::lanes::bytes::{LANES, Lanes};
 
 /// The winner of a pixel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -61,7 +61,7 @@ fn fraction(before: u16, best: u16, after: u16) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lanes::Portable;
+    use toile_geometry::lanes::bytes::Portable;
 
     #[test]
     fn lines_that_meet_between_two_disparities_give_the_fraction() {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::Vector2;
 use serde_json::Value;
-use toile_stereo::{Rectification, View, calibration::calibration_of, file_storage, rectify};
+use toile_stereo::{Rectification, View, calibration_of, file_storage, rectify};
 
 /// How far a pixel may lie from OpenCV's.
 const TOLERANCE: f64 = 1e-3;
