@@ -1,10 +1,12 @@
 //! Recording a take while it is watched: the camera's thread, the recorder, and the live preview, each at its own pace.
 //!
 //! - [`Device`]: what was asked for, opened as a source of frames; [`RigFile`]: several of them in one file;
+//!   [`Color`]: the colour of another camera beside its depth;
 //! - [`record()`]: frames go to the file in the order in which they come; none is dropped here;
 //! - [`Seen`]: what the preview, a thread that fuses what it can keep up with, knows of the turn;
 //! - [`Status`]: how the take stands, several times a second, for whoever shows it.
 
+mod color;
 mod device;
 mod error;
 mod preview;
@@ -15,6 +17,7 @@ mod stop;
 mod together;
 mod turn;
 
+pub use color::Color;
 pub use device::Device;
 pub use error::LiveError;
 pub use preview::Seen;

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toile_capture::{CaptureError, Layer, Source, Subject};
 use toile_geometry::Rigid;
 
-use crate::{LiveError, device::Device, stop::Pace, together::Together};
+use crate::{LiveError, color::Color, device::Device, stop::Pace, together::Together};
 
 /// Sensors that record together.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +20,7 @@ pub struct RigFile {
 struct Placed {
     device: Device,
     name: Option<String>,
+    color: Option<Color>,
     rig_from_depth: Rigid,
 }
 
@@ -36,6 +37,8 @@ struct SensorText {
     device: String,
     /// Short name, unique in the rig; the device's own where there is none.
     name: Option<String>,
+    /// The colour of another camera beside its depth, as `--color` has it.
+    color: Option<String>,
     /// Where its depth camera stands in the rig's frame, metres.
     #[serde(default)]
     position: [f64; 3],
@@ -77,7 +80,10 @@ impl RigFile {
     pub fn open(&self, subject: &Subject, layer: &Layer) -> Result<Box<dyn Source>, LiveError> {
         let mut sources = Vec::new();
         for placed in &self.sensors {
-            let source = placed.device.open(subject, layer)?;
+            let mut source = placed.device.open(subject, layer)?;
+            if let Some(color) = &placed.color {
+                source = color.beside(source, placed.device.pace())?;
+            }
             sources.push((source, placed.name.clone(), placed.rig_from_depth));
         }
         let together = Together::new(sources, self.pace());
@@ -96,7 +102,8 @@ fn parse(text: &str) -> Result<Vec<Placed>, String> {
         }
         let rotation = sensor.rotation.map(f64::to_radians);
         let rig_from_depth = Rigid::new(sensor.position.into(), rotation.into());
-        Ok(Placed { device: sensor.device.parse()?, name: sensor.name, rig_from_depth })
+        let color = sensor.color.map(|color| color.parse()).transpose()?;
+        Ok(Placed { device: sensor.device.parse()?, name: sensor.name, color, rig_from_depth })
     };
     let sensors: Vec<Placed> = file.sensor.into_iter().map(placed).collect::<Result<_, _>>()?;
     if sensors.iter().any(|s| s.device.pace() != sensors[0].device.pace()) {
@@ -129,6 +136,7 @@ mod tests {
             ("sensor = []", "no [[sensor]]"),
             ("[[sensor]]\ndevice = \"kinect9\"", "choose of"),
             ("[[sensor]]\ndevice = \"kinect1\"\nplace = 1", "place"),
+            ("[[sensor]]\ndevice = \"kinect1\"\ncolor = \"webcam:0\"", "needs a calibration"),
             ("[[sensor]]\ndevice = \"kinect1\"\n[[sensor]]\ndevice = \"synthetic\"", "rigs of their own"),
             ("[[sensor]]\ndevice = \"kinect1\"\nposition = [nan, 0.0, 0.0]", "finite"),
         ] {

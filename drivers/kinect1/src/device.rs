@@ -9,14 +9,14 @@ use crate::{
     find::{KINECT_FOR_WINDOWS, list},
     registration::Registration,
     rig::rig,
-    streams::KinectStreams,
+    streams::Kinect1Streams,
 };
 
 /// A Kinect that streams.
 ///
 /// After an unplug all frames that came are given, then one error, then the end.
 pub struct Kinect1 {
-    streaming: Streaming<KinectStreams>,
+    streaming: Streaming<Kinect1Streams>,
     calibration: Calibration,
     rig: Rig,
 }
@@ -34,7 +34,7 @@ impl Kinect1 {
         let mut commands = Commands::new(settings.command_limit);
         let calibration = commands.calibration(&mut *device)?;
         let limit = settings.frame_limit;
-        let streams = KinectStreams::start(device, commands, &calibration, settings.clone())?;
+        let streams = Kinect1Streams::start(device, commands, &calibration, settings.clone())?;
         let rig = rig(&info, serial, &streams.registration, &settings);
         Ok(Self { streaming: Streaming::new(streams, limit), calibration, rig })
     }

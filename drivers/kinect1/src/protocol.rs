@@ -87,7 +87,7 @@ pub enum PacketFault {
 /// Reads a packet of `stream`.
 ///
 /// # Errors
-/// [`PacketFault`] where it is none.
+/// [`PacketFault`] where it is not a packet.
 pub fn parse_packet(stream: Stream, bytes: &[u8]) -> Result<Packet<'_>, PacketFault> {
     let (header, data) = bytes.split_first_chunk::<HEADER>().ok_or(PacketFault::Short)?;
     if header[..2] != *b"RB" {

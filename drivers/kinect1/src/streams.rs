@@ -31,7 +31,7 @@ const FRAME_NS: f64 = 1e9 / FPS;
 const TICKS_PER_SECOND: u32 = 60_000_000;
 
 /// Depth and video of an open Kinect.
-pub(crate) struct KinectStreams {
+pub(crate) struct Kinect1Streams {
     device: Box<dyn UsbDevice>,
     commands: Commands,
     settings: Settings,
@@ -46,7 +46,7 @@ pub(crate) struct KinectStreams {
     health: Health,
 }
 
-impl KinectStreams {
+impl Kinect1Streams {
     /// Submits the transfers of a device whose interface is claimed, and switches its streams on.
     pub(crate) fn start(
         device: Box<dyn UsbDevice>,
@@ -196,7 +196,7 @@ impl KinectStreams {
     }
 }
 
-impl Streams for KinectStreams {
+impl Streams for Kinect1Streams {
     type Frame = Frame;
     type Error = Kinect1Error;
 

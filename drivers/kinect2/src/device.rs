@@ -5,14 +5,14 @@ use toile_driver_transport::{Bus, LinkSpeed, choose, streaming::Streaming};
 
 use crate::{
     Calibration, Health, Kinect2Error, Settings, commands::Commands, find::list, registration::Registration, rig::rig,
-    streams::KinectStreams,
+    streams::Kinect2Streams,
 };
 
 /// A Kinect that streams.
 ///
 /// After an unplug all frames that came are given, then one error, then the end.
 pub struct Kinect2 {
-    streaming: Streaming<KinectStreams>,
+    streaming: Streaming<Kinect2Streams>,
     calibration: Calibration,
     rig: Rig,
 }
@@ -33,7 +33,7 @@ impl Kinect2 {
         let identity = commands.identity(&mut *device)?;
         let calibration = commands.calibration(&mut *device)?;
         let (limit, mode) = (settings.frame_limit, settings.color);
-        let streams = KinectStreams::start(device, commands, &calibration, settings)?;
+        let streams = Kinect2Streams::start(device, commands, &calibration, settings)?;
         let rig = rig(identity, &calibration, &streams.registration, mode);
         Ok(Self { streaming: Streaming::new(streams, limit), calibration, rig })
     }

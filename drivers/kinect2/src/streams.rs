@@ -39,7 +39,7 @@ const COLOR_TRANSFERS: usize = 20;
 const DEPTH_PACKETS: usize = 8;
 
 /// Depth and colour of an open Kinect.
-pub(crate) struct KinectStreams {
+pub(crate) struct Kinect2Streams {
     device: Box<dyn UsbDevice>,
     commands: Commands,
     settings: Settings,
@@ -54,7 +54,7 @@ pub(crate) struct KinectStreams {
     health: Health,
 }
 
-impl KinectStreams {
+impl Kinect2Streams {
     /// Switches the streams of an open device on and submits the transfers.
     pub(crate) fn start(
         device: Box<dyn UsbDevice>,
@@ -201,7 +201,7 @@ impl KinectStreams {
     }
 }
 
-impl Streams for KinectStreams {
+impl Streams for Kinect2Streams {
     type Frame = Frame;
     type Error = Kinect2Error;
 

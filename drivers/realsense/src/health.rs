@@ -13,7 +13,7 @@ pub struct Health {
     pub alone: [u64; 2],
     /// Pictures that came and could not be read.
     pub broken: u64,
-    /// Pictures that came without the camera's time, which are lost while it tells that of others.
+    /// Pictures that came without the camera's time, which are lost while others have one.
     pub without_time: u64,
     /// How often the streams were switched off and on.
     pub restarts: u32,

@@ -66,7 +66,7 @@ pub fn answer(code: u32, bytes: &[u8]) -> Result<&[u8], Refusal> {
     data.ok_or_else(|| Refusal::Wrong(format!("the answer says that it has {stated} bytes")))
 }
 
-/// Why an answer is none.
+/// Why an answer cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Refusal {
     /// The firmware is still starting.

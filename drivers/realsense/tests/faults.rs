@@ -113,7 +113,7 @@ fn a_jump_of_seconds_is_no_loss() {
     assert!(frames.iter().zip(0..).all(|(f, k)| has_depth_of(f, k) && has_color_of(f, k) && f.lost_before == 0));
 }
 
-/// Depth tells its time and colour never does: both go on by one clock, and pair.
+/// Depth states its time and colour never does: both go on by one clock, and pair.
 #[test]
 fn a_stream_that_never_states_its_time_pairs_with_one_that_did() {
     // The camera's clock began seven seconds before the kernel's.

@@ -1,9 +1,9 @@
 //! Stereo rigs as depth cameras: one side-by-side camera, two cameras paired by time, or recorded pairs.
 //!
 //! - [`nodes`]: which video nodes look like stereo cameras;
-//! - [`stream`]: pictures of one camera from a video node or from a folder; [`decode`]: their bytes, pure;
-//! - [`pairing`]: two streams to pairs by time, pure; [`pairs`]: side by side, two cameras, two sensors of a recording;
-//! - [`device`]: the [`toile_capture::Source`] over it all. Matching itself is `toile_stereo`'s.
+//! - [`Pictures`]: those of one camera from a video node or from a folder; [`decode`]: their bytes, pure;
+//! - `pairing`: two streams to pairs by time, pure; [`Pairs`]: side by side, two cameras, two sensors of a recording;
+//! - [`StereoCamera`]: the [`toile_capture::Source`] over it all. Matching itself is `toile_stereo`'s.
 //!
 //! ```no_run
 //! use toile_capture::Source;
@@ -30,12 +30,12 @@
 //! ```
 
 pub mod decode;
-pub mod device;
-pub mod error;
+mod device;
+mod error;
 pub mod nodes;
-pub mod pairing;
-pub mod pairs;
-pub mod stream;
+mod pairing;
+mod pairs;
+mod stream;
 
 pub use device::{Cameras, PairCounts, StereoCamera, StereoSettings};
 pub use error::StereoDriverError;

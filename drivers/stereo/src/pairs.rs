@@ -35,7 +35,7 @@ impl<P: Pictures> Pairs for SideBySide<P> {
     fn next_moment(&mut self) -> Result<Option<Moment>, StereoDriverError> {
         let Some(picture) = self.pictures.next_picture()? else { return Ok(None) };
         if picture.image.width % 2 != 0 {
-            let reason = format!("is {} pixels wide, which has no two halves", picture.image.width);
+            let reason = format!("is {} pixels wide, which cannot be halved", picture.image.width);
             return Err(StereoDriverError::Picture { side: Side::Left, sequence: picture.sequence, reason });
         }
         let half = |k| Picture { image: Arc::new(half(&picture.image, k)), ..picture.clone() };

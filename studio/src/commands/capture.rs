@@ -9,7 +9,7 @@ use serde_json::json;
 use signal_hook::{consts::SIGINT, flag};
 use toile_capture::{LockedSubject, PendingTake, Source, Subject, printable_path};
 use toile_character::GarmentType;
-use toile_live::{Device, Pace, Recorded, RigFile, Stop, record};
+use toile_live::{Color, Device, Pace, Recorded, RigFile, Stop, record};
 use toile_pipeline::Observer;
 
 use crate::{StudioError, outcome::Answer, session::Session};
@@ -17,13 +17,15 @@ use crate::{StudioError, outcome::Answer, session::Session};
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
 Devices: kinect1[:SERIAL], kinect2[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION (a UVC depth camera),
-stereo:FILE (a stereo rig), replay:FILE, synthetic[:SEED]. Several sensors record together with --rig; docs/devices.md tells both files.
+stereo:FILE (a stereo rig), replay:FILE, synthetic[:SEED]. --color puts a webcam's colour beside a depth camera; several
+sensors record together with --rig. docs/devices.md has all the files.
 The take ends after one full turn, after --seconds, or with Ctrl-C; whatever came is kept.
 
 Examples:
   toile capture --subject anna --layer body
   toile capture --subject anna --layer trousers --type trousers --seconds 40
   toile capture --subject anna --layer trousers --retake
+  toile capture --subject anna --layer body --device uvc:/dev/video2,depth.toml --color webcam:0,webcam.toml
   toile capture --subject olga --layer body --device synthetic";
 
 /// Record a take from a camera, and see how much of the subject was seen
@@ -42,10 +44,13 @@ pub struct Capture {
     /// Where frames come from
     #[arg(long, value_name = "DEVICE", default_value = "kinect1")]
     device: Device,
+    /// Colour of another camera beside the device's depth: webcam:INDEX,CALIBRATION or replay:FILE,CALIBRATION
+    #[arg(long, value_name = "COLOR", conflicts_with = "rig")]
+    color: Option<Color>,
     /// Several sensors that record together: a file with a [[sensor]] for each
     #[arg(long, value_name = "FILE", conflicts_with = "device")]
     rig: Option<PathBuf>,
-    /// Stop after so many seconds
+    /// Stop after this many seconds
     #[arg(long, value_name = "N", conflicts_with = "one_turn")]
     seconds: Option<f64>,
     /// Stop after one full turn of the subject (what happens when nothing else is said)
@@ -115,7 +120,14 @@ impl Capture {
                 let rig = RigFile::read(file)?;
                 Ok((rig.open(subject, &pending.layer)?, rig.pace()))
             }
-            None => Ok((self.device.open(subject, &pending.layer)?, self.device.pace())),
+            None => {
+                let (depth, pace) = (self.device.open(subject, &pending.layer)?, self.device.pace());
+                let source = match &self.color {
+                    Some(color) => color.beside(depth, pace)?,
+                    None => depth,
+                };
+                Ok((source, pace))
+            }
         }
     }
 

@@ -59,7 +59,7 @@ fn problems(known: &Known, speed: LinkSpeed, opened: Result<(), rusb::Error>) ->
         found.push("it is on a USB 2 link, which halves its frame rate: use a blue port and a USB 3 cable".to_string());
     }
     match opened {
-        // Their video nodes are what is opened.
+        // Their video nodes are opened instead.
         Err(_) if matches!(known.family, known::Family::Realsense | known::Family::Orbbec) => {}
         Err(rusb::Error::Access) => found.push(format!("no permission to open it. {}", udev::advice(known.vendor))),
         Err(rusb::Error::Busy) => found.push("another program holds it: close that program".to_string()),
