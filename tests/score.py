@@ -7,6 +7,7 @@ SUBJECTS  folder of subjects (NAME/NN-layer/ with depth/, color/, camera.json, t
 EVAL      folder of the scoring scripts; run this with the Python that has their requirements
 OUT       where the subjects are imported, processed and scored (OUT/NAME, OUT/NAME.scores.json)
 --fresh   forgets what OUT holds; --quick leaves out body under clothes, trajectories and self-crossings
+--no-long leaves out the take of ordinary length: a generated person, half a minute at 30 frames a second
 """
 import argparse
 import json
@@ -144,6 +145,28 @@ def score_subject(args, name):
         json.dump(all_scores, f, indent=1)
 
 
+def score_long(args):
+    """A take of 900 frames: what noise leaves behind grows with the number of frames, a scan must not."""
+    truth, subject, take = f"{args.out}/long-truth", f"{args.out}/long", "00-body"
+    if args.fresh:
+        shutil.rmtree(truth, ignore_errors=True)
+        shutil.rmtree(subject, ignore_errors=True)
+    # The person, and so the true surface, follows from the seed alone.
+    if not os.path.exists(truth):
+        toile(args, "synthesize", "--out", truth, "--as", "folders", "--garments", "")
+    if not os.path.exists(subject):
+        toile(args, "synthesize", "--out", subject, "--garments", "", "--frames", "900", "--fps", "30")
+    _, seconds, megabytes, code = toile(args, "process", subject)
+    ROWS.append(("long", "process exit code", str(code), "0", code == 0))
+    row("long", "process wall", seconds, "s")
+    row("long", "process peak memory", megabytes, "MB", 2048)
+    s = score(args, "score_scan", f"{subject}/build/{take}/scan.ply", f"{truth}/{take}/truth/surface.ply")
+    row("long", f"{take} scan mean", get(s, "accuracy", "mean_mm"), bar=2)
+    row("long", f"{take} scan p95", get(s, "accuracy", "p95_mm"), bar=6)
+    row("long", f"{take} scan complete within 5 mm", get(s, "completeness", "within_5mm_pct"), "%", 95, True)
+    row("long", f"{take} scan far from everything", get(s, "extra_pct"), "%", 0.5)
+
+
 def main():
     a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for positional in ("subjects", "eval", "out"):
@@ -154,11 +177,14 @@ def main():
     a.add_argument("--threads", type=int, default=2)
     a.add_argument("--fresh", action="store_true")
     a.add_argument("--quick", action="store_true")
+    a.add_argument("--no-long", action="store_true")
     args = a.parse_args()
     names = args.subject or sorted(n for n in os.listdir(args.subjects) if os.path.exists(f"{args.subjects}/{n}/subject.json"))
     os.makedirs(args.out, exist_ok=True)
     for name in names:
         score_subject(args, name)
+    if not args.no_long:
+        score_long(args)
     width = max(len(r[1]) for r in ROWS)
     for subject, what, value, bar, met in ROWS:
         print(f"{subject:8s} {what:{width}s}  {value:>24s}  {bar:14s} {'' if met is None else 'met' if met else 'MISSED'}")

@@ -16,8 +16,9 @@ use crate::{
     surface::WEIGHT,
 };
 
-/// A hole whose border stays below this height over the disk is a sole, metres.
-const SOLE_HEIGHT: f32 = 0.03;
+/// A hole whose border stays below this height over where the subject was cut from the disk is a sole, metres: the rows of
+/// triangles that are trimmed from a border, twice.
+const SOLE_HEIGHT: f32 = 0.025;
 /// A sole reaches the disk within this distance of its border, metres.
 const SOLE_EDGE: f32 = 0.008;
 
@@ -39,9 +40,9 @@ pub struct Cleaned {
     pub watertight: bool,
 }
 
-/// Cleans a raw surface in the scan's frame. Where the subject stands on a level (`on_floor`), soles are closed flat
-/// at height 0.
-pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, on_floor: bool) -> (Mesh, Cleaned) {
+/// Cleans a raw surface in the scan's frame. Where the subject was cut from the level that it stands on (at the height `cut`,
+/// metres), soles are closed flat at height 0.
+pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, cut: Option<f32>) -> (Mesh, Cleaned) {
     raw.attributes.remove(WEIGHT);
     raw.normals.clear();
     let closed = settings.fill_holes && settings.volume == Volume::Auto;
@@ -56,11 +57,12 @@ pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, on_floor: bool) -> (Me
         cleaned.pieces_removed = pieces.saturating_sub(1);
     }
     if closed {
-        let soles = if on_floor { sole_borders(&mesh) } else { Vec::new() };
+        let sole_height = cut.map(|cut| cut + SOLE_HEIGHT);
+        let soles = sole_height.map_or_else(Vec::new, |height| sole_borders(&mesh, height));
         let (filled, report) = fill_holes(&mesh, f32::INFINITY);
         cleaned.holes = report.holes;
         mesh = filled;
-        flatten_soles(&mut mesh, &soles);
+        flatten_soles(&mut mesh, &soles, sole_height.unwrap_or(0.0));
     } else {
         mesh.attributes.insert(FILLED.into(), vec![0.0; mesh.positions.len()]);
     }
@@ -85,20 +87,20 @@ fn subject_pieces(pieces: &[Piece]) -> Vec<bool> {
 }
 
 /// Border positions of the holes that lie on the disk.
-fn sole_borders(mesh: &Mesh) -> Vec<nalgebra::Point3<f32>> {
-    let low = |l: &Vec<u32>| l.iter().all(|&v| mesh.positions[v as usize].y < SOLE_HEIGHT);
+fn sole_borders(mesh: &Mesh, sole_height: f32) -> Vec<nalgebra::Point3<f32>> {
+    let low = |l: &Vec<u32>| l.iter().all(|&v| mesh.positions[v as usize].y < sole_height);
     let soles = boundary_loops(&mesh.triangles).into_iter().filter(low);
     let large = soles.filter(|l| loop_length(&mesh.positions, l) > 0.05);
     large.flatten().collect::<BTreeSet<u32>>().into_iter().map(|v| mesh.positions[v as usize]).collect()
 }
 
-/// Lets filled vertices near the disk go down to it, and none below.
-fn flatten_soles(mesh: &mut Mesh, borders: &[nalgebra::Point3<f32>]) {
+/// Lets filled vertices near the disk go down to it, and not below.
+fn flatten_soles(mesh: &mut Mesh, borders: &[nalgebra::Point3<f32>], sole_height: f32) {
     if borders.is_empty() {
         return;
     }
     let filled = mesh.attributes.get(FILLED).cloned().unwrap_or_default();
-    for (p, _) in mesh.positions.iter_mut().zip(&filled).filter(|(p, f)| **f == 1.0 && p.y < SOLE_HEIGHT) {
+    for (p, _) in mesh.positions.iter_mut().zip(&filled).filter(|(p, f)| **f == 1.0 && p.y < sole_height) {
         let nearest = borders.iter().map(|b| (b.x - p.x).hypot(b.z - p.z)).fold(f32::INFINITY, f32::min);
         let share = (1.0 - nearest / SOLE_EDGE).clamp(0.0, 1.0);
         p.y = p.y.max(0.0) * share;

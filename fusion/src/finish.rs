@@ -29,6 +29,10 @@ const MOST_REFINED: usize = 200;
 const MOST_COLORED: usize = 200;
 /// Weight units that make a voxel surface: two frames at the most grazing angle.
 const LEAST_WEIGHT: u16 = 2;
+/// The same for each frame of a subject that turns before a resting camera, which sees every place in a fixed share of the
+/// frames: one frame in fifty at the most grazing angle. Flying pixels and the noise over the disk come with every frame,
+/// so the weight that makes a surface must grow with the number of frames.
+const LEAST_WEIGHT_A_FRAME: f64 = 0.02;
 
 /// What the report tells about the final field.
 struct FieldSize {
@@ -61,8 +65,9 @@ impl Fuser {
         let field = self.final_field()?;
         progress(0.7);
         let size = FieldSize { blocks: field.block_count(), bytes: field.bytes(), truncation: field.truncation() };
+        let least_weight = self.least_weight();
         let raw = self.clock.time("extract", || {
-            let crossings = crossings(&field, LEAST_WEIGHT);
+            let crossings = crossings(&field, least_weight);
             drop(field);
             tidy(&crossings)
         });
@@ -74,15 +79,23 @@ impl Fuser {
         let mesh = raw.transformed(&placed);
         drop(raw);
         // Known poses keep their own frame, whose zero is no floor.
-        let on_floor = self.settings.poses.is_none() && self.volume.as_ref().is_some_and(|v| v.floor.is_some());
+        let on_floor = self.volume.as_ref().filter(|v| v.floor.is_some() && self.settings.poses.is_none());
+        let cut = on_floor.and_then(|v| v.bottom).map(|bottom| bottom as f32);
         let settings = &self.settings;
-        let (mesh, cleaned) = self.clock.time("clean up", || clean_up(mesh, settings, on_floor));
+        let (mesh, cleaned) = self.clock.time("clean up", || clean_up(mesh, settings, cut));
         report.triangles = mesh.triangles.len();
         report.holes_filled = cleaned.holes;
         report.filled_percent = cleaned.filled_percent;
         report.watertight = cleaned.watertight;
         progress(1.0);
         Ok(self.scan(mesh, &size, &placed, report))
+    }
+
+    /// Weight units that make a voxel surface. A hand-held camera sees a place in a few of its frames only.
+    pub(crate) fn least_weight(&self) -> u16 {
+        let turning = self.volume.is_some() && self.settings.prior == Prior::Turntable;
+        let share = if turning { (LEAST_WEIGHT_A_FRAME * self.kept.len() as f64) as u16 } else { 0 };
+        share.max(LEAST_WEIGHT)
     }
 
     fn views(&self, indices: &[usize]) -> Vec<View> {
@@ -207,6 +220,7 @@ impl Fuser {
         report.frames_seen = self.seen;
         report.frames_fused = self.kept.len();
         report.dropped = self.dropped;
+        report.sensors_not_used = self.other_sensors;
         report.volume = self.volume.as_ref().map(|v| VolumeReport {
             radius_m: v.radius,
             floor_found: v.floor.is_some(),
@@ -246,6 +260,10 @@ impl Fuser {
 
 fn warnings(report: &FusionReport) -> Vec<String> {
     let mut list = Vec::new();
+    if !report.sensors_not_used.is_empty() {
+        let names = report.sensors_not_used.join("`, `");
+        list.push(format!("the scan is made from the rig's first sensor alone: the depth of `{names}` is not used"));
+    }
     if report.volume.is_some() && !report.full_turn && report.turned_deg > 0.0 {
         list.push(format!("no full turn: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));
     }

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 use toile_geometry::camera::PinholeCamera;
 
-use crate::{normals::surface_elements, view::unproject};
+use crate::{normals::surface_elements, view::unproject, volume::Resting};
 
 /// Largest angle between the floor's normal and the image's upward direction, as a cosine (40°).
 const UPWARD: f32 = 0.77;
@@ -25,6 +25,15 @@ const DISK_REACH: f64 = 0.7;
 /// Least pixels of a level.
 const LEAST_LEVEL: usize = 40;
 
+/// Standard deviations of a single frame's height by which a pixel must rise over the level to be none of its own: one of
+/// its own in 30 000 does.
+const NOISE_MARGIN: f64 = 4.0;
+/// The share of a level's pixels whose noise the margin covers: dark patches are noisier than the rest.
+const NOISE_SHARE: f64 = 0.9;
+/// The margin lies within these, metres: the pile of a carpet, and less than the height of a sole that is closed flat.
+const LEAST_MARGIN: f64 = 0.005;
+const MOST_MARGIN: f64 = 0.02;
+
 /// The plane the subject stands on, camera frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Floor {
@@ -39,12 +48,21 @@ pub struct Floor {
 struct Upward {
     point: Point3<f64>,
     normal: Vector3<f64>,
+    /// Standard deviation of a single frame's depth, metres.
+    noise: f64,
+}
+
+impl Upward {
+    /// Standard deviation of a single frame's height over a plane through the pixel: noise lies along the ray.
+    fn height_noise(&self, normal: &Vector3<f64>) -> f64 {
+        self.noise * self.point.coords.dot(normal).abs() / self.point.z.max(1e-6)
+    }
 }
 
 /// Looks for the plane under the moving `subject` (camera frame) in the background depth; `None` where there is no
 /// level patch below it.
-pub fn find_floor(camera: &PinholeCamera, background: &[f32], subject: &[Point3<f32>]) -> Option<Floor> {
-    let pixels = upward_pixels(camera, background);
+pub(crate) fn find_floor(camera: &PinholeCamera, resting: &Resting, subject: &[Point3<f32>]) -> Option<Floor> {
+    let pixels = upward_pixels(camera, resting);
     if pixels.len() < LEAST_PIXELS {
         return None;
     }
@@ -57,9 +75,9 @@ pub fn find_floor(camera: &PinholeCamera, background: &[f32], subject: &[Point3<
     Some(disk_on(&pixels, subject, normal, point))
 }
 
-fn upward_pixels(camera: &PinholeCamera, background: &[f32]) -> Vec<Upward> {
+fn upward_pixels(camera: &PinholeCamera, resting: &Resting) -> Vec<Upward> {
     let (w, h) = (camera.width as usize, camera.height as usize);
-    let elements = surface_elements(camera, background, 3);
+    let elements = surface_elements(camera, &resting.depth, 3);
     let mut pixels = Vec::new();
     for y in (0..h).step_by(2) {
         for x in (0..w).step_by(2) {
@@ -68,7 +86,8 @@ fn upward_pixels(camera: &PinholeCamera, background: &[f32]) -> Vec<Upward> {
             let normal = element.normal(rx, ry);
             if element.is_some() && -normal[1] > UPWARD {
                 let point = Point3::new(rx, ry, 1.0) * element.depth();
-                pixels.push(Upward { point: point.cast(), normal: Vector3::from(normal).cast() });
+                let noise = f64::from(resting.noise[y * w + x]);
+                pixels.push(Upward { point: point.cast(), normal: Vector3::from(normal).cast(), noise });
             }
         }
     }
@@ -133,16 +152,28 @@ fn disk_on(pixels: &[Upward], subject: &[Point3<f32>], normal: Vector3<f64>, poi
         pixels.iter().filter(|u| u.normal.dot(&normal) > ALIGNED && across(u.point - center) < DISK_REACH).collect();
     let heights: Vec<f64> = near.iter().map(|u| (u.point - point).dot(&normal)).collect();
     let (mut n, mut on) = (normal, point + normal * highest_level(&heights));
-    let mut offsets = Vec::new();
+    let mut level: Vec<&Upward> = Vec::new();
     for band in [BAND, 0.5 * BAND, 0.5 * BAND] {
-        let members: Vec<Point3<f64>> =
-            near.iter().map(|u| u.point).filter(|p| (p - on).dot(&n).abs() < band).collect();
-        (n, on) = fit_plane(&members).unwrap_or((n, on));
-        offsets = members.iter().map(|p| (p - on).dot(&n).abs()).collect();
+        level = near.iter().copied().filter(|u| (u.point - on).dot(&n).abs() < band).collect();
+        let points: Vec<Point3<f64>> = level.iter().map(|u| u.point).collect();
+        (n, on) = fit_plane(&points).unwrap_or((n, on));
     }
-    offsets.sort_unstable_by(f64::total_cmp);
-    let sigma = 1.4826 * offsets.get(offsets.len() / 2).copied().unwrap_or(0.003);
-    Floor { normal: n, point: on, margin: (5.0 * sigma).clamp(0.005, 0.02) }
+    Floor { normal: n, point: on, margin: margin(&level, &n, &on) }
+}
+
+/// Height over a level above which a single frame's pixels are not the level's own: unevenness and noise together.
+fn margin(level: &[&Upward], normal: &Vector3<f64>, point: &Point3<f64>) -> f64 {
+    let offsets = level.iter().map(|u| (u.point - point).dot(normal).abs()).collect();
+    let uneven = 1.4826 * quantile(offsets, 0.5).unwrap_or(0.003);
+    let noise = level.iter().map(|u| u.height_noise(normal)).collect();
+    let noisy = quantile(noise, NOISE_SHARE).unwrap_or(0.0);
+    (NOISE_MARGIN * uneven.hypot(noisy)).clamp(LEAST_MARGIN, MOST_MARGIN)
+}
+
+/// The value below which a share of the values lies; `None` where there are no values.
+fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get((values.len() as f64 * share) as usize).copied()
 }
 
 /// Where the subject stands: the mean of its low points, or of all where none is low.

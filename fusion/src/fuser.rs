@@ -94,6 +94,8 @@ pub struct Fuser {
     pub(crate) lost: Lost,
     pictures: Vec<(usize, Arc<Picture>)>,
     pub(crate) dropped: Vec<DroppedFrame>,
+    /// Names of sensors whose depth is not fused.
+    pub(crate) other_sensors: Vec<String>,
     pub(crate) seen: usize,
     pub(crate) touched: usize,
     pub(crate) updated: usize,
@@ -126,6 +128,7 @@ impl Fuser {
             lost: Lost::default(),
             pictures: Vec::new(),
             dropped: Vec::new(),
+            other_sensors: Vec::new(),
             seen: 0,
             touched: 0,
             updated: 0,

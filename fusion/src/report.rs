@@ -41,6 +41,8 @@ pub struct FusionReport {
     pub frames_fused: usize,
     /// Frames left out, with reasons.
     pub dropped: Vec<DroppedFrame>,
+    /// Sensors of the rig that gave depth but are not in the scan: it is made from the first sensor alone.
+    pub sensors_not_used: Vec<String>,
     /// Degrees turned about the axis from the first to the last fused frame.
     pub turned_deg: f64,
     /// True when the turn is at least 340°.

@@ -1,6 +1,6 @@
 //! A whole take at once: read, survey, push every frame, finish.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use rayon::prelude::*;
 use toile_capture::{DepthImage, Frame, Rig, Source, depth_codec};
@@ -57,7 +57,7 @@ pub fn fuse(
 ) -> Result<Scan, FusionError> {
     let rig = source.rig().clone();
     let mut clock = Stopwatch::new();
-    let (frames, unreadable) = clock.time("read", || read_all(source, progress))?;
+    let Recording { frames, unreadable, other_sensors } = clock.time("read", || read_all(source, progress))?;
     let volume = match settings.volume {
         Volume::All => None,
         Volume::Auto => Some(clock.time("survey", || survey(&rig, &spread(&frames), settings))?),
@@ -66,6 +66,7 @@ pub fn fuse(
     fuser.clock = clock;
     fuser.seen += unreadable.len();
     fuser.dropped.extend(unreadable);
+    fuser.other_sensors = other_sensors;
     let count = frames.len().max(1) as f32;
     for (i, frame) in frames.into_iter().enumerate() {
         let frame = fuser.clock.time("unpack", || frame.unpacked());
@@ -82,13 +83,21 @@ fn spread(frames: &[Waiting]) -> Vec<Frame> {
     with_depth.into_iter().step_by(step).map(Waiting::unpacked).collect()
 }
 
-/// All frames of the first sensor, and those that could not be read.
-fn read_all(
-    source: &mut dyn Source,
-    progress: &(dyn Fn(f32) + Sync),
-) -> Result<(Vec<Waiting>, Vec<DroppedFrame>), FusionError> {
+/// What a source holds.
+struct Recording {
+    /// The frames of the first sensor.
+    frames: Vec<Waiting>,
+    /// Frames that could not be read.
+    unreadable: Vec<DroppedFrame>,
+    /// Names of the other sensors that gave depth.
+    other_sensors: Vec<String>,
+}
+
+/// Reads all frames.
+fn read_all(source: &mut dyn Source, progress: &(dyn Fn(f32) + Sync)) -> Result<Recording, FusionError> {
     let total = source.frame_count();
     let (mut frames, mut unreadable): (Vec<Waiting>, _) = (Vec::new(), Vec::new());
+    let mut others = BTreeSet::new();
     let mut failures = 0;
     loop {
         match source.next_frame() {
@@ -96,7 +105,7 @@ fn read_all(
                 let pack = frames.len() >= UNPACKED;
                 frames.push(Waiting::new(frame, pack));
             }
-            Ok(Some(_)) => {}
+            Ok(Some(frame)) => others.extend(frame.depth.map(|_| frame.sensor)),
             Ok(None) => break,
             Err(error) => {
                 failures += 1;
@@ -114,7 +123,8 @@ fn read_all(
     if !frames.iter().any(Waiting::has_depth) {
         return Err(FusionError::NoDepth { frames: frames.len() });
     }
-    Ok((frames, unreadable))
+    let name = |k: usize| source.rig().sensors.get(k).map_or_else(|| format!("number {k}"), |s| s.name.clone());
+    Ok(Recording { frames, unreadable, other_sensors: others.into_iter().map(name).collect() })
 }
 
 /// Finds the subject's volume in frames spread over the take.

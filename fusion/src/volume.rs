@@ -22,6 +22,8 @@ const MOVING: (f32, f32) = (0.06, 0.03);
 const RESTING: f32 = 0.4;
 /// A pixel measured in at most this share of the frames sees nothing but what passes.
 const PASSING: f32 = 0.25;
+/// Rounds in which a pixel's window of resting depths is centred.
+const CENTERING: usize = 3;
 /// Edge of the cells that moving points are clustered in, metres.
 const CELL: f32 = 0.10;
 /// Least moving pixels a frame, as a share of the image, that count as somebody.
@@ -59,9 +61,7 @@ pub fn find_volume(camera: &PinholeCamera, depths: &[Vec<f32>]) -> Result<Subjec
     if subject.len() * SAMPLE * SAMPLE < least {
         return Err(nobody("what moves is scattered, no single subject".into()));
     }
-    let resting: Vec<f32> =
-        background.far.iter().zip(&background.rests).map(|(&d, &rests)| if rests { d } else { 0.0 }).collect();
-    let floor = find_floor(camera, &resting, &subject);
+    let floor = find_floor(camera, &background.resting, &subject);
     let up = floor.as_ref().map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal);
     Ok(cylinder(&subject, up, floor))
 }
@@ -69,20 +69,29 @@ pub fn find_volume(camera: &PinholeCamera, depths: &[Vec<f32>]) -> Result<Subjec
 /// Pixels of the survey are taken every so many rows and columns.
 const SAMPLE: usize = 2;
 
+/// The resting surface of each pixel over the frames of a survey.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Resting {
+    /// Median depth, metres; 0 where nothing rests.
+    pub depth: Vec<f32>,
+    /// Standard deviation of a single frame's depth, metres; 0 where nothing rests.
+    pub noise: Vec<f32>,
+}
+
 /// What rests behind the subject.
 struct Background {
     /// The farthest depth of each pixel that a second frame confirms; 0 where there is none.
     far: Vec<f32>,
-    /// True where many frames agree on that depth.
-    rests: Vec<bool>,
-    /// True where hardly any frame measures anything: what is seen there passes by.
+    /// Where many frames agree on that depth: what it is.
+    resting: Resting,
+    /// True where few frames measure anything: what is seen there passes by.
     open: Vec<bool>,
 }
 
 impl Background {
     fn new(depths: &[Vec<f32>]) -> Self {
         let count = depths.first().map_or(0, Vec::len);
-        let (mut far, mut rests, mut open) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut far, mut resting, mut open) = (Vec::new(), Resting::default(), Vec::new());
         let mut values = Vec::with_capacity(depths.len());
         for i in 0..count {
             values.clear();
@@ -90,13 +99,31 @@ impl Background {
             values.sort_unstable_by(f32::total_cmp);
             let confirmed = values.windows(2).rev().find(|w| w[1] - w[0] < 0.02 * w[1]).map_or(0.0, |w| w[0]);
             let near = confirmed - 0.015f32.max(0.012 * confirmed);
-            let agreeing = values.iter().filter(|&&d| d >= near).count();
+            let agreeing = &values[values.partition_point(|&d| d < near)..];
+            let rests = agreeing.len() as f32 >= RESTING * depths.len() as f32;
+            let (depth, noise) = if rests { median_and_deviation(&values, agreeing) } else { (0.0, 0.0) };
+            resting.depth.push(depth);
+            resting.noise.push(noise);
             far.push(confirmed);
-            rests.push(agreeing as f32 >= RESTING * depths.len() as f32);
             open.push(values.len() as f32 <= PASSING * depths.len() as f32);
         }
-        Self { far, rests, open }
+        Self { far, resting, open }
     }
+}
+
+/// Median of the depths of a resting surface and their standard deviation about it, from all of a pixel's depths
+/// (ascending) and the farthest ones that agree. The farthest depths alone lie behind the surface by twice the noise, so
+/// the window is moved until it reaches as far before the median as behind it.
+fn median_and_deviation(ascending: &[f32], farthest: &[f32]) -> (f32, f32) {
+    let mut window = farthest;
+    for _ in 0..CENTERING {
+        let (median, last) = (window[window.len() / 2], window[window.len() - 1]);
+        let end = ascending.partition_point(|&d| d <= last);
+        window = &ascending[ascending.partition_point(|&d| d < 2.0 * median - last)..end];
+    }
+    let median = window[window.len() / 2];
+    let squares: f32 = window.iter().map(|d| (d - median) * (d - median)).sum();
+    (median, (squares / window.len() as f32).sqrt())
 }
 
 fn moving_points(camera: &PinholeCamera, depths: &[Vec<f32>], background: &Background) -> Vec<Point3<f32>> {

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Raised whenever the same recording and settings give another scan.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Expected seconds for a turn of 100 frames.
 pub const COST: f64 = 9.0;
 
