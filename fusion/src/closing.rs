@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Point3, Vector6};
 use rayon::prelude::*;
-use toile_geometry::{Rigid, transform_point};
+use toile_geometry::{Rigid, statistics::median, transform_point};
 
 use crate::{
     normals::dot,
@@ -213,8 +213,7 @@ fn seam_offset(pairs: &[(usize, usize)], systems: &[Normal], seam: impl Fn(&(usi
     };
     let mut sizes: Vec<f64> =
         pairs.iter().zip(systems).filter(|(p, s)| seam(p) && s.count > 100).filter_map(|(_, s)| alone(s)).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)
+    median(&mut sizes).unwrap_or(0.0)
 }
 
 fn subject_center(nodes: &[Node], poses: &[Rigid]) -> Point3<f64> {

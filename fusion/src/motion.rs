@@ -2,7 +2,7 @@
 //! constant velocity.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
-use toile_geometry::Rigid;
+use toile_geometry::{Rigid, statistics::median};
 
 use crate::settings::Prior;
 
@@ -79,8 +79,7 @@ impl MotionModel {
         let steps = self.poses.windows(2).rev().take(RATE_STEPS);
         let mut rates: Vec<f64> =
             steps.map(|w| axis.angle(&(w[1].1 * w[0].1.inverse())) / seconds(w[1].0 - w[0].0).max(1e-6)).collect();
-        rates.sort_unstable_by(f64::total_cmp);
-        rates.get(rates.len() / 2).copied().unwrap_or(0.0)
+        median(&mut rates).unwrap_or(0.0)
     }
 }
 

@@ -1,6 +1,9 @@
 //! How noisy a depth image is, from the image itself.
 
-use toile_geometry::camera::PinholeCamera;
+use toile_geometry::{
+    camera::PinholeCamera,
+    statistics::{SIGMA_PER_MAD, median},
+};
 
 use crate::view::is_measured;
 
@@ -24,11 +27,10 @@ pub fn depth_noise(camera: &PinholeCamera, depth: &[f32]) -> Option<f64> {
     if offsets.len() < 200 {
         return None;
     }
-    let middle = offsets.len() / 2;
-    let (_, median, _) = offsets.select_nth_unstable_by(middle, f32::total_cmp);
+    let median = median(&mut offsets)?;
     // The mean of 2 REACH neighbours carries noise of its own.
     let share = (1.0 + 1.0 / (2 * REACH) as f64).sqrt();
-    Some(1.4826 * f64::from(*median) / share)
+    Some(SIGMA_PER_MAD * f64::from(median) / share)
 }
 
 /// Absolute offset of a pixel from the mean of its neighbours along one direction.

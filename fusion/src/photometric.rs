@@ -7,7 +7,11 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use toile_capture::{RgbImage, Sensor};
-use toile_geometry::{Rigid, camera::PinholeCamera};
+use toile_geometry::{
+    Rigid,
+    camera::PinholeCamera,
+    statistics::{median, sigma_about_zero},
+};
 
 use crate::{
     normals::dot,
@@ -166,9 +170,9 @@ fn joint_system(
         if all.len() < LEAST_POINTS {
             continue;
         }
-        let offset = median(&mut all);
+        let offset = median(&mut all).unwrap_or(0.0);
         let mut sizes: Vec<f64> = all.iter().map(|d| (d - offset).abs()).collect();
-        let spread = (1.4826 * median(&mut sizes)).max(LEAST_SPREAD.0);
+        let spread = sigma_about_zero(&mut sizes).unwrap_or(0.0).max(LEAST_SPREAD.0);
         let cut = 4.7 * spread;
         let share = 1.0 / earlier.len() as f64;
         let colors = accumulate(points, pose, center, |_, _, s| {
@@ -211,13 +215,4 @@ impl<'a> Against<'a> {
         let (there, gradient) = self.seen.picture.look_up(self.level, &p)?;
         Some((f64::from(there - here), (self.scan_turn * gradient).into()))
     }
-}
-
-/// The middle value; 0 of none.
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -7,7 +7,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
-use toile_geometry::Rigid;
+use toile_geometry::{Rigid, statistics::median};
 
 use crate::{
     Prior,
@@ -74,8 +74,7 @@ impl Fuser {
     fn usual_residual(&self) -> f64 {
         let mut last: Vec<f64> =
             self.kept.iter().rev().take(USUAL).filter_map(|k| k.tracked.map(|t| t.residual)).collect();
-        last.sort_unstable_by(f64::total_cmp);
-        last.get(last.len() / 2).copied().unwrap_or(f64::INFINITY)
+        median(&mut last).unwrap_or(f64::INFINITY)
     }
 }
 

@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, Matrix6, Point3, SymmetricEigen, Translation3, UnitQuaternion, Vector3, Vector6};
 use rayon::prelude::*;
 use serde::Serialize;
-use toile_geometry::Rigid;
+use toile_geometry::{Rigid, statistics::sigma_about_zero};
 
 use crate::{
     normals::dot,
@@ -230,9 +230,7 @@ pub(crate) fn robust_spread(tsdf: &Tsdf, points: &[Sample], pose: &Rigid) -> Opt
     if all.len() < LEAST_POINTS {
         return None;
     }
-    let middle = all.len() / 2;
-    let (_, median, _) = all.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(1.4826 * *median)
+    sigma_about_zero(&mut all)
 }
 
 /// Signed distance of every sample; `None` outside the band.
@@ -254,8 +252,7 @@ pub(crate) fn assess(tsdf: &Tsdf, points: &[Sample], result: Tracked) -> Tracked
     let all = distances(tsdf, points, &result.scan_from_camera);
     let within: Vec<f64> = all.iter().flatten().copied().collect();
     let mut sizes: Vec<f64> = within.iter().map(|d| d.abs()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    let spread = 1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    let spread = sigma_about_zero(&mut sizes).unwrap_or(0.0);
     let limit = (3.0 * spread).max(5e-4);
     let inliers: Vec<f64> = within.iter().copied().filter(|d| d.abs() <= limit).collect();
     let mean_square = inliers.iter().map(|d| d * d).sum::<f64>() / inliers.len().max(1) as f64;
