@@ -108,7 +108,7 @@ fn stages(c: &mut Criterion) {
         b.iter(|| pose_under(&fit.body, &[], &fit.pose, black_box(&scan), &settings, &|_| {}).unwrap());
     });
     group.bench_function("settle/100k", |b| {
-        b.iter(|| settle_under(&model, &fit.body, &fit.pose, black_box(&scan)).unwrap());
+        b.iter(|| settle_under(&model, &fit.body, &fit.pose, black_box(&scan), &settings).unwrap());
     });
     group.bench_function("measure", |b| {
         b.iter(|| measure_table(&model, black_box(&fit.body), &fit.measurements).unwrap());

@@ -1,4 +1,4 @@
-//! How sure the fit and its verdict are: `strangers PEOPLE.bin [CASE] [FIRST] [COUNT] [OUT]` fits scans of people that the model
+//! Measures how often the fit and its verdict are right: `strangers PEOPLE.bin [CASE] [FIRST] [COUNT] [OUT]` fits scans of people that the model
 //! was not made from (`python -m toile_body.strangers` writes them) and prints a line for each and the quantiles. What
 //! misses goes to the folder OUT.
 //!

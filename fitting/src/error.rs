@@ -1,6 +1,6 @@
-//! What can go wrong with a fit.
+//! Errors of the fits.
 
-/// Errors of the fitting crate: there is no answer at all. A poor answer is a [`crate::Verdict`], not an error.
+/// Errors of the fitting crate: there is no result at all. A poor result is a [`crate::Verdict`], not an error.
 #[derive(Debug, thiserror::Error)]
 pub enum FittingError {
     /// The mesh cannot be fitted to.
@@ -14,16 +14,16 @@ pub enum FittingError {
     Setting {
         /// The field.
         name: &'static str,
-        /// What is wrong and what it may be.
+        /// Its value and the values it may have.
         reason: String,
     },
     /// The normal equations or the elastic system have no solution.
-    #[error("{what} could not be solved: the scan leaves the body undetermined; scan more of the body")]
+    #[error("{what} could not be solved: the scan does not determine the body; scan more of it")]
     Singular {
-        /// Which system.
+        /// The unknowns that were solved for.
         what: &'static str,
     },
-    /// Parts of a character do not fit together.
+    /// Parts of a character do not match.
     #[error(transparent)]
     Character(#[from] toile_character::CharacterError),
 }

@@ -3,51 +3,34 @@
 //! - [`fit_body`]: shape and pose of one scan (Hu et al. 2017, eq. 4), conformation, stature and girths;
 //! - [`rig_scan`], [`rigged_scan`]: skin weights onto the scan itself;
 //! - [`pose_under`]: any skinned mesh posed inside a more dressed scan (eq. 5 and 6);
+//! - [`pose_as_worn`]: which of several takes a scan shows again;
 //! - [`settle_under`]: the body in that pose, hands turned to the scan, drawn inside it;
 //! - [`measure()`]: stature and girths of a body at rest; [`measure_table`]: all measures by ISO 8559-1.
 //!
 //! A fit that should not be trusted is a result with a [`Verdict`]; having no answer is a [`FittingError`].
 
-mod arms;
-mod articulated;
-mod body_fit;
-mod cloud;
 mod conform;
-mod contain;
-mod correspond;
-mod equations;
 mod error;
-mod fingers;
-mod landmarks;
-mod level;
-mod mapping;
+mod fit;
 pub mod measure;
-mod point_tree;
-mod prepare;
-mod prior;
 mod rig;
 mod section;
 mod settings;
-mod settle;
+mod solve;
 mod stance;
-mod start;
 mod summary;
+mod surface;
 mod tape;
-mod thin;
-mod uncross;
 mod under;
-mod under_stage;
-mod verdict;
 
-pub use body_fit::{BodyFit, fit_body};
-pub use error::FittingError;
-pub use landmarks::ScanLandmark;
-pub use measure::{Measurements, measure};
-pub use prepare::Mend;
-pub use rig::{rig_scan, rigged_scan};
-pub use settings::{ConformSettings, FitSettings, HandLandmarks, UnderSettings};
-pub use settle::{SettleReport, SettledBody, settle_under};
-pub use summary::{BodySummary, Theta};
-pub use tape::{BodyLandmark, BodyMeasure, MeasureKind, MeasureTable, measure_table};
-pub use under::{UnderFit, UnderReport, pose_under};
-pub use verdict::{DistanceStats, FitReport, Verdict};
+pub use {
+    conform::ScanLandmark,
+    error::FittingError,
+    fit::{BodyFit, DistanceStats, FitReport, Mend, Verdict, fit_body},
+    measure::{Measurements, measure},
+    rig::{rig_scan, rigged_scan},
+    settings::{ConformSettings, FitSettings, HandLandmarks, LandmarkMap, Method, UnderSettings},
+    summary::{BodySummary, Theta},
+    tape::{BodyLandmark, BodyMeasure, MeasureKind, MeasureTable, measure_table},
+    under::{SettleReport, SettledBody, UnderFit, UnderReport, pose_as_worn, pose_under, settle_under},
+};

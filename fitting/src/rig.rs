@@ -5,15 +5,15 @@ use rayon::prelude::*;
 use toile_character::{Pose, SkinWeights, SkinnedMesh, skinning};
 use toile_geometry::{Mesh, bvh::Bvh, topology::VertexNeighbors};
 
-/// Normals of scan and body must make at least this cosine, so that an arm does not move with the torso it touches.
+/// Smallest cosine between the normals of scan and body: keeps an arm from moving with the torso that it touches.
 const MIN_COS: f32 = 0.2;
-/// Farther than this the nearest triangle is taken whatever its normal, metres.
+/// Beyond this distance the nearest triangle counts whatever its normal, metres.
 const REACH: f32 = 0.08;
 
 /// Weights for every scan vertex: the closest compatible triangle of the posed body, by barycentric coordinates, then
-/// averaged once with the neighbours so that no seam is left where neighbouring vertices chose different parts.
+/// averaged once with the neighbours, so that neighbouring vertices which chose different parts leave no seam.
 ///
-/// `scan` must lie in the frame of `body.posed(pose)`. Without triangles in the body all follow joint 0.
+/// `scan` must lie in the frame of `body.posed(pose)`. With a body without triangles, all vertices follow joint 0.
 pub fn rig_scan(scan: &Mesh, body: &SkinnedMesh, pose: &Pose) -> SkinWeights {
     let posed = body.posed_mesh(pose);
     let bvh = Bvh::new(&posed.positions, &posed.triangles);
@@ -39,7 +39,7 @@ pub fn rig_scan(scan: &Mesh, body: &SkinnedMesh, pose: &Pose) -> SkinWeights {
     smoothed(scan, &weights)
 }
 
-/// Half of each vertex's own weights and half of its neighbours' mean.
+/// Averages each vertex's own weights with its neighbours' mean.
 fn smoothed(scan: &Mesh, weights: &SkinWeights) -> SkinWeights {
     let neighbors = VertexNeighbors::new(scan.positions.len(), &scan.triangles);
     let mut out = SkinWeights::default();
@@ -53,7 +53,7 @@ fn smoothed(scan: &Mesh, weights: &SkinWeights) -> SkinWeights {
     out
 }
 
-/// The scan as a skinned mesh: taken back from `pose` to the body's rest, with weights by [`rig_scan`].
+/// The scan as a skinned mesh: un-posed from `pose` to the body's rest, with weights by [`rig_scan`].
 pub fn rigged_scan(scan: &Mesh, body: &SkinnedMesh, pose: &Pose) -> SkinnedMesh {
     let weights = rig_scan(scan, body, pose);
     let transforms = pose.skinning_transforms(&body.skeleton);

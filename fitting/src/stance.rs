@@ -3,7 +3,7 @@
 //! The model's A-pose is made for skinning: its legs are straightened along the line from hip to ankle, which dents
 //! the seat and sinks the crown. A person who stands straight has the knee a little before that line and the legs
 //! less far apart, which is also the stance that the template was sculpted in. The A-pose's skinning is undone
-//! vertex by vertex, so nothing is lost on the way.
+//! vertex by vertex, so that no detail is lost.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use toile_character::{JOINT_COUNT, Joint, Pose, Skeleton, SkinnedMesh, joint::JOINTS, skinning};
@@ -54,7 +54,7 @@ fn goal(joint: Joint) -> Option<(Joint, Vector3<f64>)> {
     }
 }
 
-/// Least rotation from one direction to another, also where they are (nearly) the same.
+/// Smallest rotation from one direction to another, also where they are (nearly) the same.
 fn least_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
     let (Some(a), Some(b)) = (from.try_normalize(1e-9), to.try_normalize(1e-9)) else {
         return UnitQuaternion::identity();

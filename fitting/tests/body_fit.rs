@@ -1,4 +1,4 @@
-//! The body fit against people of known shape and pose, and against what is no person.
+//! The body fit against people of known shape and pose, and against scans that do not show a person.
 
 mod common;
 
@@ -89,7 +89,7 @@ fn nonsense_is_refused_with_a_sentence() {
     let model = BodyModel::load_default().unwrap();
     let refused = |scan: &Mesh| fit(&model, scan).unwrap_err().to_string();
     assert!(refused(&Mesh::default()).contains("no triangles"));
-    assert!(refused(&cuboid([0.0; 3], [0.02; 3])).contains("no person"));
+    assert!(refused(&cuboid([0.0; 3], [0.02; 3])).contains("not the size of a person"));
     let mut broken = cuboid([0.0; 3], [1.0; 3]);
     broken.positions[3].y = f32::NAN;
     assert!(refused(&broken).contains("not finite"));

@@ -47,5 +47,5 @@ fn the_body_passes_through_a_landmark_set_by_hand_in_the_scans_own_units() {
     let landmark = set.landmarks.iter().find(|l| l.name == "navel").unwrap();
     assert!(landmark.by_hand && landmark.seen == 1.0);
     let error = run(BTreeMap::from([("nabel".to_owned(), [0.0; 3])])).unwrap_err().to_string();
-    assert!(error.contains("no nabel") && error.contains("navel"), "{error}");
+    assert!(error.contains("no landmark nabel") && error.contains("navel"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! Scans that show no person, or not as one should stand: the verdict says so and what to do.
+//! Scans that do not show a standing person: the verdict says so and what to do.
 
 mod common;
 
@@ -21,7 +21,7 @@ fn ellipsoid(center: [f32; 3], radii: [f32; 3], seed: u64) -> Mesh {
 }
 
 #[test]
-fn a_cat_is_no_person() {
+fn a_cat_is_refused() {
     let model = BodyModel::load_default().unwrap();
     let leg = |x: f32, z: f32| ellipsoid([x, 0.08, z], [0.025, 0.09, 0.025], 3);
     let cat = joined(&[
@@ -39,7 +39,7 @@ fn a_cat_is_no_person() {
 }
 
 #[test]
-fn a_wall_and_a_ball_are_no_person() {
+fn a_wall_and_a_ball_are_refused() {
     let model = BodyModel::load_default().unwrap();
     for scan in [finer(&cuboid([0.0; 3], [1.5, 1.8, 0.02]), 5), ellipsoid([0.0, 0.9, 0.0], [0.9; 3], 5)] {
         let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {}).unwrap();

@@ -1,4 +1,4 @@
-//! People whom the model was not made from: other seeds and wider local sliders than its own, other poses, noise, a
+//! People that the model was not made from: other seeds and wider local sliders of the same source of shapes, other poses, noise, a
 //! fifth of the surface missing. `tests/data/strangers6.bin` holds the first six of the two hundred that
 //! `python -m toile_body.strangers` writes; `examples/strangers.rs` runs all of them.
 

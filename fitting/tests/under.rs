@@ -88,7 +88,7 @@ fn a_settled_body_lies_inside_and_keeps_its_covered_skin() {
     // the body was found 3 mm off; lips and lids stay, so the head does not count
     let off = truth.pose.moved(&Isometry3::translation(0.0, 0.0, 0.003), &body.skeleton);
     let before = body.posed(&off);
-    let settled = settle_under(&model, &body, &off, &scan).unwrap();
+    let settled = settle_under(&model, &body, &off, &scan, &UnderSettings::default()).unwrap();
     let skin = |points: &[nalgebra::Point3<f32>]| -> Vec<_> {
         points.iter().zip(&model.regions).filter(|(_, r)| **r != Region::Head).map(|(p, _)| *p).collect()
     };
@@ -110,7 +110,8 @@ fn settling_adds_no_crossing() {
         let truth = person(&model, seed, 0.0);
         let body = model.skinned(&truth.beta);
         let off = truth.pose.moved(&Isometry3::translation(0.002, 0.0, 0.003), &body.skeleton);
-        let settled = settle_under(&model, &body, &off, &dressed(&model, &truth.beta, &truth.pose, 0.008)).unwrap();
+        let scan = dressed(&model, &truth.beta, &truth.pose, 0.008);
+        let settled = settle_under(&model, &body, &off, &scan, &UnderSettings::default()).unwrap();
         let before = crossings(&body.posed_mesh(&settled.pose));
         let added = crossings(&settled.mesh).into_iter().filter(|pair| before.binary_search(pair).is_err()).count();
         assert_eq!(added, 0, "seed {seed}, the posed body has {}", before.len());
@@ -126,14 +127,19 @@ fn a_wrist_that_turned_since_the_last_take_is_turned_again() {
     let wrist = next.rotation_mut(Joint::LeftHand);
     *wrist = UnitQuaternion::from_scaled_axis(Vector3::z() * 0.05) * *wrist;
     let scan = dressed(&model, &truth.beta, &next, 0.01);
-    let settled = settle_under(&model, &body, &truth.pose, &scan).unwrap();
+    let settled = settle_under(&model, &body, &truth.pose, &scan, &UnderSettings::default()).unwrap();
     let tip = model.landmark("leftMiddleFingerTip").unwrap() as usize;
     let at = |pose: &Pose| body.posed(pose)[tip];
     let (was, is) = ((at(&truth.pose) - at(&next)).norm(), (at(&settled.pose) - at(&next)).norm());
     assert!(was > 0.006 && is < 0.3 * was, "{is} of {was} m left");
     let other = Mesh::new(vec![nalgebra::Point3::origin(); 3], vec![[0, 1, 2]]);
     let wrong = toile_character::SkinnedMesh { mesh: other, ..body };
-    assert!(settle_under(&model, &wrong, &truth.pose, &scan).unwrap_err().to_string().contains("template"));
+    assert!(
+        settle_under(&model, &wrong, &truth.pose, &scan, &UnderSettings::default())
+            .unwrap_err()
+            .to_string()
+            .contains("template")
+    );
 }
 
 #[test]
@@ -155,7 +161,7 @@ fn an_arm_that_went_astray_under_its_sleeve_is_brought_back_by_its_hand() {
         pose
     };
     let (astray, slightly) = (astray(0.025), astray(0.008));
-    let settled = settle_under(&model, &body, &astray, &scan).unwrap();
+    let settled = settle_under(&model, &body, &astray, &scan, &UnderSettings::default()).unwrap();
     let at = |pose: &Pose, joint: Joint| pose.joint_positions(&body.skeleton)[joint.index()];
     for wrist in [Joint::LeftHand, Joint::RightHand] {
         let off = |pose: &Pose| (at(pose, wrist) - at(&truth.pose, wrist)).norm();
@@ -163,7 +169,8 @@ fn an_arm_that_went_astray_under_its_sleeve_is_brought_back_by_its_hand() {
         assert!(was > 0.006 && is < 0.35 * was, "{wrist:?}: {is} of {was} m left");
     }
     // an arm that is seen stays, however its hand lies
-    let bare = settle_under(&model, &body, &slightly, &body.posed_mesh(&truth.pose)).unwrap();
+    let bare =
+        settle_under(&model, &body, &slightly, &body.posed_mesh(&truth.pose), &UnderSettings::default()).unwrap();
     let elbow = |pose: &Pose| at(pose, Joint::LeftLowerArm);
     assert!((elbow(&bare.pose) - elbow(&slightly)).norm() < 1e-6);
 }
@@ -189,7 +196,7 @@ fn one_and_two_threads_give_the_same_bits() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let settings = UnderSettings::default();
         let pose = pool.install(|| pose_under(&body, &[], &truth.pose, &scan, &settings, &|_| {})).unwrap().pose;
-        let settled = pool.install(|| settle_under(&model, &body, &pose, &scan)).unwrap();
+        let settled = pool.install(|| settle_under(&model, &body, &pose, &scan, &UnderSettings::default())).unwrap();
         (settled.pose, settled.mesh.positions)
     };
     assert_eq!(run(1), run(2));
@@ -204,4 +211,37 @@ fn nonsense_is_refused_with_a_sentence() {
     };
     assert!(run(&[], &Mesh::default()).unwrap_err().to_string().contains("no triangles"));
     assert!(run(&[1.0], &body.mesh).unwrap_err().to_string().contains("trust"));
+}
+
+#[test]
+fn skin_far_outside_is_counted_and_drawn_in() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 21, 0.0);
+    let body = model.skinned(&truth.beta);
+    let scan = dressed(&model, &truth.beta, &truth.pose, 0.006);
+    // the thighs were found 12 mm too far to the front, farther than what noise explains
+    let mut off = truth.pose.clone();
+    for thigh in [Joint::LeftUpperLeg, Joint::RightUpperLeg] {
+        let rotation = off.rotation_mut(thigh);
+        *rotation = UnitQuaternion::from_scaled_axis(Vector3::x() * -0.05) * *rotation;
+    }
+    let settled = settle_under(&model, &body, &off, &scan, &UnderSettings::default()).unwrap();
+    let report = settled.report;
+    let outer: Vec<_> = (0..model.vertex_count()).filter(|&v| !model.inner[v]).collect();
+    let of = |points: &[nalgebra::Point3<f32>]| -> Vec<_> { outer.iter().map(|&v| points[v]).collect() };
+    let (was, is) =
+        (outside(&of(&body.posed(&off)), &scan, 0.002), outside(&of(&settled.mesh.positions), &scan, 0.002));
+    assert!((report.outside_before - was).abs() < 0.02 && (report.outside - is).abs() < 1e-9, "{was} {is} {report:?}");
+    assert!(was > 0.05 && is < 0.3 * was, "outside {was} before, {is} after");
+}
+
+#[test]
+fn a_mesh_beside_the_scan_is_all_outside() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 22, 0.0);
+    let body = model.skinned(&truth.beta);
+    let scan = dressed(&model, &truth.beta, &truth.pose, 0.0);
+    let aside = truth.pose.moved(&Isometry3::translation(2.0, 0.0, 0.0), &body.skeleton);
+    let settled = settle_under(&model, &body, &aside, &scan, &UnderSettings::default()).unwrap();
+    assert!(settled.report.outside > 0.99 && settled.report.outside_most_mm > 500.0, "{:?}", settled.report);
 }

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Raised whenever the same inputs and settings give another pose.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 /// With more than this share of the take before outside the scan, earlier takes are tried; one with half of that is believed.
 const OUTSIDE: f64 = 0.1;
 /// Key of the result that names the take whose scan was found again.
@@ -75,8 +75,8 @@ pub fn run(run: &Run, n: usize, body: &Body, model: &BodyModel) -> Result<Record
                 format!("the person of the take before was not found in it: {}", fit.report.reasons.join("; "));
             return Err(PipelineError::stage(&scan_path, reason));
         }
-        let settled =
-            settle_under(model, &body.skinned, &fit.pose, &scan).map_err(|e| PipelineError::stage(&scan_path, e))?;
+        let settled = settle_under(model, &body.skinned, &fit.pose, &scan, &settings)
+            .map_err(|e| PipelineError::stage(&scan_path, e))?;
         Ok(Product {
             files: vec![
                 (pose_path.clone(), pose_bytes(&settled.pose)?),

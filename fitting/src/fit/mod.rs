@@ -1,0 +1,23 @@
+//! Shape and pose of one scan: prepared, started from several headings, refined, judged.
+
+mod arms;
+mod body;
+mod evidence;
+mod fingers;
+mod guides;
+mod matches;
+mod placement;
+mod prepare;
+mod problem;
+mod report;
+mod resolution;
+mod seed;
+mod starts;
+mod verdict;
+
+pub(crate) use fingers::fit_hands_again;
+pub use {
+    body::{BodyFit, fit_body},
+    prepare::Mend,
+    report::{DistanceStats, FitReport, Verdict},
+};

@@ -1,0 +1,57 @@
+//! What a body fit decided and how good it is.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// Whether a fit is to be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The body explains the scan.
+    Trusted,
+    /// Usable, but somebody should look at it: see the report's reasons.
+    Doubtful,
+    /// The scan probably does not show one standing person, or shows too little of one.
+    Failed,
+}
+
+/// Distances between two surfaces, millimetres, weighted by area.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct DistanceStats {
+    /// Mean.
+    pub mean_mm: f64,
+    /// Median.
+    pub median_mm: f64,
+    /// 95th percentile.
+    pub p95_mm: f64,
+}
+
+/// What a body fit decided and how good it is.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct FitReport {
+    /// Whether to trust it.
+    pub verdict: Verdict,
+    /// Why not, in words; empty where it is trusted.
+    pub reasons: Vec<String>,
+    /// What was mended on the scan, in words.
+    pub notices: Vec<String>,
+    /// Gauss–Newton steps over all starts and resolutions.
+    pub iterations: usize,
+    /// Whether the finest resolution came to rest.
+    pub converged: bool,
+    /// Trusted scan surface to the statistical model.
+    pub scan_to_model: DistanceStats,
+    /// Trusted scan surface to the conformed body.
+    pub scan_to_body: DistanceStats,
+    /// Share of the body's outer surface that the scan covers, 0–1.
+    pub body_covered: f64,
+    /// Share of the scan's trusted surface that lies within 20 mm of the body (100 mm where the person is dressed), 0–1.
+    pub scan_explained: f64,
+    /// Root mean square of β: 1 for an ordinary body.
+    pub shape_rms: f64,
+    /// Shape and measures are estimated: the person was dressed.
+    pub estimated: bool,
+    /// Share of each region's outer surface that the scan covers, 0–1, as `body_covered`.
+    pub region_covered: BTreeMap<String, f64>,
+}

@@ -1,0 +1,97 @@
+//! Where a fit begins: the scan's front, up and arm angles are unknown, so that several starts compete.
+
+use std::f64::consts::TAU;
+
+use nalgebra::UnitQuaternion;
+use rayon::prelude::*;
+use toile_character::BodyModel;
+use toile_geometry::Mesh;
+
+use super::{
+    arms::found_arms,
+    guides::Guides,
+    placement::Placement,
+    problem::BodyProblem,
+    resolution::{Resolution, Sampled},
+};
+use crate::{
+    FittingError,
+    solve::{Descent, JointPrior, State, descend},
+};
+
+/// Turns of the upper arms away from the A-pose that are tried, degrees; positive raises the arms.
+const ARM_TURNS: [f64; 3] = [0.0, -25.0, 35.0];
+/// Number of starts that are refined.
+const REFINED: usize = 4;
+/// Standard deviation that the coarse shape is held to, in those of β: height and girth of nearly everybody.
+const COARSE_SHAPE_SIGMA: f64 = 1.0;
+
+/// A coarse fit of one start.
+pub(crate) struct Start {
+    pub state: State,
+    /// Index of the up rotation it stands by.
+    pub up: usize,
+    /// Coarse misfit, 0–1.
+    pub misfit: f64,
+    pub iterations: usize,
+}
+
+/// The best coarse fits, best first. `ups` are the rotations that may turn the scan upright.
+///
+/// # Errors
+/// [`FittingError`] where the scan has no surface or leaves the pose undetermined.
+pub(crate) fn starts(
+    model: &BodyModel,
+    scan: &Mesh,
+    trust: &[f32],
+    ups: &[UnitQuaternion<f64>],
+    guides: &Guides,
+    headings: usize,
+    coarse: Resolution,
+) -> Result<Vec<Start>, FittingError> {
+    let sampled = Sampled::new(model, scan, trust, guides, coarse)?;
+    let prior = JointPrior::standing(&model.mean_skeleton);
+    let problem = sampled.problem(&prior, COARSE_SHAPE_SIGMA);
+    let coarse_fit = |start: Start| -> Result<Start, FittingError> {
+        let first = ended(&problem, start.up, descend(&problem, start.state, coarse.iterations)?);
+        let Some(state) = found_arms(&problem, &first.state) else { return Ok(first) };
+        let mut again = ended(&problem, start.up, descend(&problem, state, coarse.iterations)?);
+        again.iterations += first.iterations;
+        Ok(if again.misfit < first.misfit { again } else { first })
+    };
+    let candidates = candidates(model, scan, &problem, ups, headings)?;
+    let mut refined = candidates.into_par_iter().map(coarse_fit).collect::<Result<Vec<_>, _>>()?;
+    refined.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    Ok(refined)
+}
+
+fn ended(problem: &BodyProblem, up: usize, end: Descent) -> Start {
+    Start { misfit: problem.misfit(&end.state), state: end.state, up, iterations: end.iterations }
+}
+
+/// All starts, driven by landmarks where some were set by hand and judged without moving them further: the best arms for
+/// each heading and up, of these the most promising few.
+fn candidates(
+    model: &BodyModel,
+    scan: &Mesh,
+    problem: &BodyProblem,
+    ups: &[UnitQuaternion<f64>],
+    headings: usize,
+) -> Result<Vec<Start>, FittingError> {
+    let components = problem.columns.betas;
+    let places: Vec<Placement> = ups.iter().map(|up| Placement::new(model, scan, up, components)).collect();
+    let turns: Vec<(usize, usize)> = (0..ups.len()).flat_map(|u| (0..headings).map(move |h| (u, h))).collect();
+    let judged = |(up, h): (usize, usize)| -> Result<Start, FittingError> {
+        let heading = TAU * h as f64 / headings as f64;
+        let [first, others @ ..] = ARM_TURNS.map(|arms| {
+            let state = places[up].state(model, heading, arms.to_radians(), &ups[up]);
+            let state = problem.guide.map_or(Ok(state.clone()), |guide| guide.drive(state, problem.prior))?;
+            Ok::<_, FittingError>(Start { misfit: problem.misfit(&state), state, up, iterations: 0 })
+        });
+        others.into_iter().try_fold(first?, |a, b| b.map(|b| if b.misfit < a.misfit { b } else { a }))
+    };
+    let mut best = turns.into_par_iter().map(judged).collect::<Result<Vec<_>, _>>()?;
+    best.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    best.truncate(REFINED);
+    Ok(best)
+}

@@ -1,0 +1,303 @@
+//! Whether a fit is to be trusted: a table of rules over shares (0–1), metres and standard deviations.
+
+use nalgebra::Point3;
+use toile_character::BodyModel;
+use toile_geometry::Mesh;
+
+use super::{
+    evidence::{Coverage, Distances, samples},
+    report::{FitReport, Verdict},
+};
+use crate::{
+    Measurements,
+    solve::{Descent, State},
+};
+
+/// Distances within which scan and body belong together, metres.
+struct Reach {
+    /// The body explains the scan.
+    explained: f32,
+    /// The scan covers the body.
+    covered: f32,
+}
+
+/// Of skin: four times the misfit of the coarsest model that is believed.
+const SKIN: Reach = Reach { explained: 0.02, covered: 0.015 };
+/// Under clothes: as far as a coat or a wide skirt stands off.
+const CLOTHES: Reach = Reach { explained: 0.10, covered: 0.10 };
+/// A region of which a smaller share than this was scanned is estimated.
+const BARELY_SEEN: f64 = 0.3;
+/// Each doubt alone may have a reason of its own; this many together have one: the fit is wrong. A dressed person
+/// brings one of them along.
+const TOO_MANY_DOUBTS: usize = 3;
+
+/// What rules judge.
+struct Evidence<'a> {
+    report: &'a FitReport,
+    /// Large regions that were barely seen.
+    hidden: &'a [String],
+    /// Standing, metres.
+    stature: f64,
+}
+
+/// Values at which a rule finds fault.
+#[derive(Clone, Copy)]
+enum Bounds {
+    /// Below the value.
+    Below(f64),
+    /// Above the value.
+    Above(f64),
+    /// Outside of the range.
+    Outside(f64, f64),
+    /// At no value.
+    Never,
+}
+
+/// One thing that can be wrong with a fit.
+struct Rule {
+    /// The value that is judged: a share, metres, or standard deviations.
+    value: fn(&Evidence) -> f64,
+    doubtful: Bounds,
+    failed: Bounds,
+    /// What to tell people, and what to do.
+    reason: fn(&Evidence) -> String,
+}
+
+/// Shares explained: an arm laid wrongly leaves 0.7 % of the scan over, noise 0.4 % at most. Unusual shapes: people outside the model's
+/// span reach 1.9.
+const ON_SKIN: [Rule; 7] = [
+    Rule { doubtful: Bounds::Below(0.995), failed: Bounds::Below(0.80), ..EXPLAINED },
+    Rule { doubtful: Bounds::Below(0.60), failed: Bounds::Below(0.25), ..COVERED },
+    HIDDEN,
+    Rule { doubtful: Bounds::Above(0.008), failed: Bounds::Above(0.020), ..MODEL_DISTANCE },
+    BODY_DISTANCE,
+    STATURE,
+    UNUSUAL,
+];
+
+/// Clothes leave more over and stand off the model; whoever is dressed is estimated.
+const UNDER_CLOTHES: [Rule; 7] = [
+    Rule { doubtful: Bounds::Below(0.97), failed: Bounds::Below(0.80), ..EXPLAINED },
+    Rule { doubtful: Bounds::Below(0.60), failed: Bounds::Below(0.25), ..COVERED },
+    HIDDEN,
+    Rule { doubtful: Bounds::Above(0.040), failed: Bounds::Above(0.100), ..MODEL_DISTANCE },
+    DRESSED,
+    STATURE,
+    UNUSUAL,
+];
+
+const EXPLAINED: Rule = Rule {
+    value: |e| e.report.scan_explained,
+    doubtful: Bounds::Never,
+    failed: Bounds::Never,
+    reason: |e| {
+        let explained = 100.0 * e.report.scan_explained;
+        format!(
+            "the body explains {explained:.1} % of the scan: is there one standing person in it, alone and lightly dressed?"
+        )
+    },
+};
+
+const COVERED: Rule = Rule {
+    value: |e| e.report.body_covered,
+    doubtful: Bounds::Never,
+    failed: Bounds::Never,
+    reason: |e| {
+        let covered = 100.0 * e.report.body_covered;
+        format!("the scan covers {covered:.0} % of the body and the rest is estimated: scan the person from all sides")
+    },
+};
+
+/// The number of large regions that were barely seen, unless the rule before already says that much is missing.
+const HIDDEN: Rule = Rule {
+    value: |e| if e.report.body_covered >= 0.60 { e.hidden.len() as f64 } else { 0.0 },
+    doubtful: Bounds::Above(0.0),
+    failed: Bounds::Never,
+    reason: |e| barely_seen(e.hidden),
+};
+
+const MODEL_DISTANCE: Rule = Rule {
+    value: |e| 1e-3 * e.report.scan_to_model.mean_mm,
+    doubtful: Bounds::Never,
+    failed: Bounds::Never,
+    reason: |e| {
+        let mean = e.report.scan_to_model.mean_mm;
+        format!("the model lies {mean:.1} mm from the scan on average: are clothes, hair or things held in the way?")
+    },
+};
+
+/// A conformed body farther than 3 mm from its own scan has not found its place: noise leaves 1 to 2 mm.
+const BODY_DISTANCE: Rule = Rule {
+    value: |e| 1e-3 * e.report.scan_to_body.mean_mm,
+    doubtful: Bounds::Above(0.003),
+    failed: Bounds::Never,
+    reason: |e| {
+        let mean = e.report.scan_to_body.mean_mm;
+        format!(
+            "the body's own surface lies {mean:.1} mm from the scan on average: check whether it stands in the scan"
+        )
+    },
+};
+
+const DRESSED: Rule = Rule {
+    value: |e| f64::from(u8::from(e.report.estimated)),
+    doubtful: Bounds::Above(0.0),
+    failed: Bounds::Never,
+    reason: |_| "the person is dressed: shape and measures are estimated".into(),
+};
+
+/// Adults from the smallest to the tallest, metres.
+const STATURE: Rule = Rule {
+    value: |e| e.stature,
+    doubtful: Bounds::Outside(1.2, 2.2),
+    failed: Bounds::Outside(0.6, 2.5),
+    reason: |e| {
+        let stature = e.stature;
+        format!("the body would stand {stature:.2} m tall: is it a whole person, and is the scan in metres?")
+    },
+};
+
+const UNUSUAL: Rule = Rule {
+    value: |e| e.report.shape_rms,
+    doubtful: Bounds::Above(2.0),
+    failed: Bounds::Above(3.0),
+    reason: |e| {
+        let rms = e.report.shape_rms;
+        format!(
+            "the shape is {rms:.1} times as unusual as an ordinary body's: is there one person in it, and nothing else?"
+        )
+    },
+};
+
+impl Bounds {
+    fn is_exceeded(self, value: f64) -> bool {
+        match self {
+            Self::Below(limit) => value < limit,
+            Self::Above(limit) => value > limit,
+            Self::Outside(low, high) => !(low..=high).contains(&value),
+            Self::Never => false,
+        }
+    }
+}
+
+/// Measures a fit and judges it. `points` is the conformed body in the scan's pose, `scan` has normals.
+pub(crate) fn judge(
+    model: &BodyModel,
+    (scan, trust): (&Mesh, &[f32]),
+    fine: &Descent,
+    points: &[Point3<f32>],
+    measurements: &Measurements,
+    dressed: bool,
+) -> FitReport {
+    let reach = if dressed { CLOTHES } else { SKIN };
+    let State { beta, pose } = &fine.state;
+    let samples = samples(scan, trust);
+    let to_model = Distances::new(&samples, &model.posed(beta, pose), model);
+    let covered = Coverage::new(model, points, scan, trust, reach.covered);
+    let mut report = FitReport {
+        verdict: Verdict::Trusted,
+        reasons: Vec::new(),
+        notices: Vec::new(),
+        iterations: fine.iterations,
+        converged: fine.converged,
+        scan_to_model: to_model.stats(),
+        scan_to_body: Distances::new(&samples, points, model).stats(),
+        body_covered: covered.whole,
+        scan_explained: to_model.share_within(reach.explained),
+        shape_rms: (beta.iter().map(|b| b * b).sum::<f64>() / beta.len().max(1) as f64).sqrt(),
+        estimated: dressed,
+        region_covered: covered.regions,
+    };
+    decide(&mut report, measurements.stature_m);
+    report
+}
+
+/// Sets verdict and reasons; regions that do not matter for the rest of the body become a notice.
+fn decide(report: &mut FitReport, stature: f64) {
+    let hidden = report.region_covered.iter().filter(|r| *r.1 < BARELY_SEEN).map(|r| r.0.clone());
+    let (small, large): (Vec<String>, Vec<String>) = hidden.partition(|r| is_small(r));
+    let evidence = Evidence { report, hidden: &large, stature };
+    let mut verdict = Verdict::Trusted;
+    let mut reasons = Vec::new();
+    for rule in if report.estimated { &UNDER_CLOTHES } else { &ON_SKIN } {
+        let value = (rule.value)(&evidence);
+        let has_failed = rule.failed.is_exceeded(value);
+        if has_failed || rule.doubtful.is_exceeded(value) {
+            verdict = verdict.max(if has_failed { Verdict::Failed } else { Verdict::Doubtful });
+            reasons.push((rule.reason)(&evidence));
+        }
+    }
+    let expected = usize::from(report.estimated);
+    report.verdict = if reasons.len() >= TOO_MANY_DOUBTS + expected { Verdict::Failed } else { verdict };
+    report.reasons = reasons;
+    if !small.is_empty() {
+        report.notices.push(barely_seen(&small));
+    }
+}
+
+/// A hand, a foot or the head alone moves the rest of the body little.
+fn is_small(region: &str) -> bool {
+    region.ends_with("hand") || region.ends_with("foot") || region == "head"
+}
+
+fn barely_seen(regions: &[String]) -> String {
+    format!("barely seen, so estimated: {}", regions.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::report::DistanceStats;
+
+    fn good(estimated: bool) -> FitReport {
+        FitReport {
+            verdict: Verdict::Failed,
+            reasons: Vec::new(),
+            notices: Vec::new(),
+            iterations: 1,
+            converged: true,
+            scan_to_model: DistanceStats { mean_mm: 2.0, ..DistanceStats::default() },
+            scan_to_body: DistanceStats { mean_mm: 1.0, ..DistanceStats::default() },
+            body_covered: 0.95,
+            scan_explained: 0.999,
+            shape_rms: 1.0,
+            estimated,
+            region_covered: [("left hand".into(), 0.1), ("torso".into(), 0.9)].into(),
+        }
+    }
+
+    fn judged(mut report: FitReport, stature: f64) -> (Verdict, usize) {
+        decide(&mut report, stature);
+        (report.verdict, report.reasons.len())
+    }
+
+    #[test]
+    fn each_rule_finds_its_own_fault_and_three_doubts_fail() {
+        assert_eq!(judged(good(false), 1.7), (Verdict::Trusted, 0));
+        assert_eq!(judged(good(true), 1.7), (Verdict::Doubtful, 1));
+        let explained = FitReport { scan_explained: 0.99, ..good(false) };
+        assert_eq!(judged(explained.clone(), 1.7), (Verdict::Doubtful, 1));
+        assert_eq!(judged(FitReport { scan_explained: 0.7, ..good(false) }, 1.7), (Verdict::Failed, 1));
+        assert_eq!(judged(FitReport { body_covered: 0.2, ..good(false) }, 1.7), (Verdict::Failed, 1));
+        assert_eq!(
+            judged(FitReport { region_covered: [("torso".into(), 0.2)].into(), ..good(false) }, 1.7).0,
+            Verdict::Doubtful
+        );
+        let far = |mean_mm| DistanceStats { mean_mm, ..DistanceStats::default() };
+        assert_eq!(judged(FitReport { scan_to_model: far(9.0), ..good(false) }, 1.7), (Verdict::Doubtful, 1));
+        assert_eq!(judged(FitReport { scan_to_model: far(9.0), ..good(true) }, 1.7), (Verdict::Doubtful, 1));
+        assert_eq!(judged(FitReport { scan_to_body: far(4.0), ..good(false) }, 1.7), (Verdict::Doubtful, 1));
+        assert_eq!(judged(FitReport { shape_rms: 2.5, ..good(false) }, 1.7), (Verdict::Doubtful, 1));
+        assert_eq!(judged(good(false), 1.0), (Verdict::Doubtful, 1));
+        assert_eq!(judged(good(false), f64::NAN), (Verdict::Failed, 1));
+        let three = FitReport { scan_to_body: far(4.0), shape_rms: 2.5, ..explained };
+        assert_eq!(judged(three, 1.7), (Verdict::Failed, 3));
+    }
+
+    #[test]
+    fn a_hidden_hand_is_a_notice_only() {
+        let mut report = good(false);
+        decide(&mut report, 1.7);
+        assert_eq!(report.notices, ["barely seen, so estimated: left hand"]);
+    }
+}

@@ -1,0 +1,31 @@
+//! The seed's own pose under clothes: articulated ICP on chosen joints (Hu et al. 2017, eq. 5), the mesh kept inside the
+//! scan (eq. 6).
+
+use toile_character::Joint;
+
+use super::problem::Sampled;
+use crate::{
+    FittingError, UnderSettings,
+    solve::{Columns, Descent, Norm, PointToPoint, State, descend},
+};
+
+/// Steps of the whole mesh before its joints turn.
+const RIGID_STEPS: usize = 12;
+
+/// The pose from `start` on, which stands near the scan's middle at about its heading.
+///
+/// # Errors
+/// [`FittingError::Singular`] where the scan leaves a joint undetermined.
+pub(crate) fn seed_pose(sampled: &Sampled, start: State, settings: &UnderSettings) -> Result<Descent, FittingError> {
+    let over = |joints: Vec<Joint>, inside: bool| PointToPoint {
+        body: &sampled.body,
+        scan: &sampled.scan,
+        columns: Columns::new(joints, 0),
+        norm: Norm::Squared,
+        inside,
+    };
+    let rigid = descend(&over(vec![Joint::Hips], false), start, RIGID_STEPS)?;
+    let chosen = [Joint::Hips].into_iter().chain(settings.joints.iter().copied().filter(|j| *j != Joint::Hips));
+    let end = descend(&over(chosen.collect(), settings.inside), rigid.state, settings.fine_iterations)?;
+    Ok(Descent { iterations: rigid.iterations + end.iterations, ..end })
+}
