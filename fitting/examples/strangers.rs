@@ -9,7 +9,7 @@ use std::{path::Path, time::Instant};
 
 use nalgebra::Isometry3;
 use toile_character::{BodyModel, Joint};
-use toile_fitting::{FitSettings, Verdict, fit_body, measure::stature, measure_table};
+use toile_fitting::{FitSettings, Verdict, fit_body, measure_table, stature};
 use toile_geometry::{Mesh, ply};
 
 #[path = "../tests/common/mod.rs"]
@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mm = 1e3 * strangers::surface_distance(&model, &truth, &fit.posed_body());
         let joints =
             1e3 * joint_distance(&fit.pose.joint_positions(&fit.skeleton), &pose.joint_positions(&body.skeleton));
-        let standing = measure_table(&model, body, &fit.measurements)?.standing;
+        let standing = measure_table(&model, body)?.standing;
         let tall = 1e3 * (fit.measurements.stature_m - stature(&standing, &model.inner));
         let r = &fit.report;
         println!(

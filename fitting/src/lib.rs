@@ -5,32 +5,34 @@
 //! - [`pose_under`]: any skinned mesh posed inside a more dressed scan (eq. 5 and 6);
 //! - [`pose_as_worn`]: which of several takes a scan shows again;
 //! - [`settle_under`]: the body in that pose, hands turned to the scan, drawn inside it;
-//! - [`measure()`]: stature and girths of a body at rest; [`measure_table`]: all measures by ISO 8559-1.
+//! - [`measure_table`]: the measurements of ISO 8559-1; [`measure_extremes`]: stature and the girths that bodies are scored by.
 //!
 //! A fit that should not be trusted is a result with a [`Verdict`]; having no answer is a [`FittingError`].
 
 mod conform;
 mod error;
 mod fit;
-pub mod measure;
+mod measure;
 mod rig;
-mod section;
 mod settings;
 mod solve;
 mod stance;
 mod summary;
 mod surface;
-mod tape;
 mod under;
 
 pub use {
     conform::ScanLandmark,
     error::FittingError,
     fit::{BodyFit, DistanceStats, FitReport, Mend, Verdict, fit_body},
-    measure::{Measurements, measure},
+    measure::{
+        definition::MeasureKind,
+        extremes::{Girth, Measurements, measure_extremes, stature},
+        table::{BodyLandmark, MeasureTable, measure_table},
+        taken::BodyMeasure,
+    },
     rig::{rig_scan, rigged_scan},
     settings::{ConformSettings, FitSettings, HandLandmarks, LandmarkMap, Method, UnderSettings},
     summary::{BodySummary, Theta},
-    tape::{BodyLandmark, BodyMeasure, MeasureKind, MeasureTable, measure_table},
     under::{SettleReport, SettledBody, UnderFit, UnderReport, pose_as_worn, pose_under, settle_under},
 };

@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use toile_character::joint::JOINTS;
 
-use crate::{BodyFit, FitReport, Mend, ScanLandmark, measure::Girth};
+use crate::{BodyFit, FitReport, Girth, Mend, ScanLandmark};
 
 /// The content of `body.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct BodySummary {
     /// Standing straight, metres.
     pub stature_m: f64,
-    /// chest, waist, hip in metres.
+    /// The girths that bodies are scored by: chest, waist, hip as extremes within shares of the stature, metres. The
+    /// measurements of ISO 8559-1 are in `measurements.json`.
     pub girths_m: BTreeMap<&'static str, f64>,
     /// The same with the heights they were taken at.
     pub girths: BTreeMap<&'static str, Girth>,

@@ -7,7 +7,7 @@ mod common;
 use common::{Numbers, joint_distance, strangers};
 use toile_character::BodyModel;
 use toile_character::{Joint, JointRegressor};
-use toile_fitting::{FitSettings, Verdict, fit_body, measure::stature, measure_table};
+use toile_fitting::{FitSettings, Verdict, fit_body, measure_table, stature};
 
 const PEOPLE: &[u8] = include_bytes!("data/strangers6.bin");
 
@@ -43,7 +43,7 @@ fn one_view_of_a_kinect_v2_gives_a_body_that_is_doubted_but_near() {
         let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {}).unwrap();
         let off = strangers::surface_distance(&model, &truth, &fit.posed_body());
         assert!(off < 0.010, "person {k}: {off} m off");
-        let standing = measure_table(&model, body, &fit.measurements).unwrap().standing;
+        let standing = measure_table(&model, body).unwrap().standing;
         let tall = fit.measurements.stature_m - stature(&standing, &model.inner);
         assert!(tall.abs() < 0.025, "person {k}: {tall} m too tall");
         assert_eq!(fit.verdict(), Verdict::Doubtful, "person {k}: {:?}", fit.report);

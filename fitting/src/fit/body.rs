@@ -17,7 +17,7 @@ use super::{
 use crate::{
     FitSettings, FittingError, HandLandmarks, Method, ScanLandmark,
     conform::{conform, landmarks, set_by_hand},
-    measure::{Measurements, measure, stature},
+    measure::extremes::{Measurements, measure_extremes, stature},
     solve::{Descent, JointPrior, State, descend},
     stance::standing,
     surface::trust_of,
@@ -218,7 +218,7 @@ fn measured(model: &BodyModel, body: &SkinnedMesh, pose: &Pose) -> Measurements 
             *lifted.rotation_mut(shoulder) = UnitQuaternion::identity();
         }
     }
-    measure(&body.posed_mesh(&lifted), &model.inner, stature)
+    measure_extremes(model, &body.posed_mesh(&lifted), stature)
 }
 
 /// What was mended on the scan, in words.

@@ -7,6 +7,7 @@ use toile_geometry::Mesh;
 
 pub mod strangers;
 pub mod surface;
+pub mod tape;
 
 /// A small deterministic generator of numbers between −1 and 1 (Weyl sequence, mixed).
 pub struct Numbers(pub u64);

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Raised whenever the same scan and settings give another body.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// Expected seconds.
 pub const COST: f64 = 4.0;
 
@@ -178,7 +178,7 @@ fn product(place: &Place, model: &BodyModel, scan: &Mesh, fit: &BodyFit) -> Resu
     let rigged = rigged_scan(&scan, &weights, &fit.skeleton, &fit.pose)?;
     let mut body = fit.posed_body();
     body.colors = closest_colors(&scan, &body.positions, &body.normals);
-    let table = measure_table(model, &fit.body, &fit.measurements).map_err(|e| PipelineError::stage(&place.scan, e))?;
+    let table = measure_table(model, &fit.body).map_err(|e| PipelineError::stage(&place.scan, e))?;
     let files = vec![
         (at("measurements.json"), stage::pretty(&table)?),
         (at("measurements.csv"), table.csv().into_bytes()),

@@ -1,0 +1,48 @@
+//! A measurement that was taken.
+
+use serde::{Deserialize, Serialize};
+
+use crate::measure::{
+    definition::{Definition, MeasureKind},
+    parts::Side,
+    section::Tape,
+};
+
+/// One measurement.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BodyMeasure {
+    /// Such as `waist girth` or `left upper arm length`.
+    pub name: String,
+    /// How it is taken.
+    pub kind: MeasureKind,
+    /// Metres: the length of `path`.
+    pub value_m: f64,
+    /// What it is: the clause of ISO 8559-1 where there is one, and the definition in words.
+    #[serde(default)]
+    pub definition: String,
+    /// Where the tape lies on the standing body: corners in metres.
+    pub path: Vec<[f64; 3]>,
+}
+
+/// Measurements in the order in which they were taken.
+#[derive(Debug, Default)]
+pub(crate) struct Taken(pub Vec<BodyMeasure>);
+
+impl Taken {
+    /// Adds a measurement; one whose tape could not be laid is left out.
+    pub fn add(&mut self, definition: &Definition, tape: Option<Tape>) {
+        self.push(definition.name.to_string(), definition, tape);
+    }
+
+    /// Adds a measurement of one side.
+    pub fn add_side(&mut self, side: Side, definition: &Definition, tape: Option<Tape>) {
+        self.push(format!("{} {}", side.word(), definition.name), definition, tape);
+    }
+
+    fn push(&mut self, name: String, definition: &Definition, tape: Option<Tape>) {
+        let Some(tape) = tape else { return };
+        let path = tape.path.iter().map(|p| (*p).into()).collect();
+        let (kind, definition) = (definition.kind, definition.text());
+        self.0.push(BodyMeasure { name, kind, value_m: tape.length, definition, path });
+    }
+}

@@ -1,0 +1,105 @@
+//! Girths of many people against brute force, and against other parts of the body in the way.
+
+mod common;
+
+use common::{Numbers, tape};
+use toile_character::{BodyModel, Region, SkinnedMesh};
+use toile_fitting::{FitSettings, fit_body, measure_extremes, measure_table, stature};
+
+/// How many people are drawn from the body model.
+const PEOPLE: u64 = 48;
+/// The library's tapes and those by brute force: parts told apart by regions or by weights, levels 2 mm apart or at
+/// vertices, metres.
+const AGREE: f64 = 0.006;
+
+/// A person about the mean of a sex, with a spread of 1.3 times the population's: thin, heavy, small and tall.
+fn drawn(model: &BodyModel, seed: u64) -> SkinnedMesh {
+    let mut numbers = Numbers(1_000_003 * seed + 7);
+    let mean = if seed.is_multiple_of(2) { &model.population.beta_female } else { &model.population.beta_male };
+    let beta: Vec<f64> = mean.iter().map(|&b| f64::from(b) + 1.3 * numbers.normal()).collect();
+    model.skinned(&beta)
+}
+
+#[test]
+fn the_girths_of_many_people_are_those_that_brute_force_finds() {
+    let model = BodyModel::load_default().unwrap();
+    for seed in 0..PEOPLE {
+        let body = drawn(&model, seed);
+        let table = measure_table(&model, &body).unwrap();
+        for (name, truth) in tape::girths(&model, &body, &table) {
+            let value = table.value(&name).unwrap_or_else(|| panic!("{name} of person {seed} is missing"));
+            assert!((value - truth).abs() < AGREE, "{name} of person {seed}: {value} m, by brute force {truth}");
+        }
+    }
+}
+
+/// The body with the vertices of some regions moved sideways (towards the middle by `by` metres).
+fn squeezed(model: &BodyModel, body: &SkinnedMesh, regions: &[Region], by: f32) -> SkinnedMesh {
+    let mut moved = body.clone();
+    for (p, region) in moved.mesh.positions.iter_mut().zip(&model.regions) {
+        if regions.contains(region) {
+            p.x -= by * p.x.signum();
+        }
+    }
+    moved
+}
+
+#[test]
+fn thighs_that_touch_and_arms_that_press_on_the_trunk_change_no_tape() {
+    use Region::*;
+    let model = BodyModel::load_default().unwrap();
+    for seed in 0..6 {
+        let body = drawn(&model, seed);
+        let free = measure_table(&model, &body).unwrap();
+        let legs = [LeftLeg, RightLeg, LeftFoot, RightFoot];
+        let thighs = measure_table(&model, &squeezed(&model, &body, &legs, 0.06)).unwrap();
+        let arms = [LeftArm, RightArm, LeftHand, RightHand];
+        let pressed = measure_table(&model, &squeezed(&model, &body, &arms, 0.12)).unwrap();
+        for name in ["mid-thigh girth", "knee girth", "calf girth"] {
+            for side in ["left", "right"] {
+                let name = format!("{side} {name}");
+                let (a, b) = (free.value(&name).unwrap(), thighs.value(&name).unwrap());
+                assert!((a - b).abs() < 0.01, "{name} of person {seed}: {a} apart, {b} with thighs that touch");
+            }
+        }
+        for name in ["chest girth", "bust girth", "waist girth", "top hip girth", "hip girth"] {
+            let (a, b) = (free.value(name).unwrap(), pressed.value(name).unwrap());
+            assert!((a - b).abs() < 1e-6, "{name} of person {seed}: {a} with free arms, {b} with arms pressed on");
+        }
+    }
+}
+
+/// With short legs, the shares of the stature at which bodies are scored lie above the armpits, where the arms hang on the
+/// trunk.
+#[test]
+fn the_scored_chest_leaves_the_arms_out_above_the_armpits_too() {
+    let model = BodyModel::load_default().unwrap();
+    for seed in 0..12 {
+        let mut body = drawn(&model, seed);
+        let crotch = body.mesh.positions[model.landmark("crotch").unwrap() as usize].y;
+        body.mesh.positions.iter_mut().filter(|p| p.y < crotch).for_each(|p| p.y = crotch - 0.7 * (crotch - p.y));
+        let low = body.mesh.positions.iter().map(|p| p.y).fold(f32::MAX, f32::min);
+        body.mesh.positions.iter_mut().for_each(|p| p.y -= low);
+        let armpit = body.mesh.positions[model.landmark("leftAxilla").unwrap() as usize].y;
+        let scored = measure_extremes(&model, &body.mesh, stature(&body.mesh, &model.inner));
+        assert!(f64::from(armpit) < 0.735 * scored.stature_m, "person {seed} has armpits above the tape");
+        let bust = measure_table(&model, &body).unwrap().value("bust girth").unwrap();
+        let girth = scored.chest.girth_m;
+        assert!(girth < 1.08 * bust, "person {seed}: chest {girth} m, bust {bust} m: the arms are in the tape");
+    }
+}
+
+#[test]
+fn a_person_in_another_pose_has_the_same_measures() {
+    let model = BodyModel::load_default().unwrap();
+    let person = common::person(&model, 41, 70.0);
+    let truth = measure_table(&model, &model.skinned(&person.beta)).unwrap();
+    let scan = common::scanned(&model, &person, 0.001, 5);
+    let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {}).unwrap();
+    let fitted = measure_table(&model, &fit.body).unwrap();
+    for (a, b) in truth.measures.iter().zip(&fitted.measures) {
+        // heights within 5 mm, girths and lengths within 10 mm, or 3 % of what is shorter
+        let tolerance = (0.01f64).max(0.03 * a.value_m).min(0.015);
+        assert!((a.value_m - b.value_m).abs() < tolerance, "{}: {} m, fitted {} m", a.name, a.value_m, b.value_m);
+    }
+}
