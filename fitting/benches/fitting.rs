@@ -18,7 +18,7 @@ use toile_geometry::Mesh;
 mod common;
 use common::{Numbers, joint_distance, strangers, surface};
 
-/// A person outside the model's span, its pose, and its scan with every triangle cut in four.
+/// A person of other sliders than the model's, its pose, and its scan with every triangle cut in four.
 fn stranger(model: &BodyModel) -> (SkinnedMesh, Pose, Mesh) {
     let body = strangers::read(model, include_bytes!("../tests/data/strangers6.bin")).swap_remove(2);
     let mut numbers = Numbers(7);
@@ -51,7 +51,7 @@ fn step_time(model: &BodyModel, scan: &Mesh, from: f32, to: f32) -> Duration {
     at(to) - at(from)
 }
 
-/// How far joints that follow the shape lie from those of people outside the model's span, before any fit.
+/// How far joints that follow the shape lie from those of people of other sliders than the model's, before any fit.
 fn print_joint_errors(model: &BodyModel) {
     let people = strangers::read(model, include_bytes!("../tests/data/strangers6.bin"));
     for joints in [JointRegressor::Affine, JointRegressor::MeanValue] {

@@ -1,6 +1,6 @@
-//! Measures how often the fit and its verdict are right: `strangers PEOPLE.bin [CASE] [FIRST] [COUNT] [OUT]` fits scans of people that the model
-//! was not made from (`python -m toile_body.strangers` writes them) and prints a line for each and the quantiles. What
-//! misses goes to the folder OUT.
+//! How sure the fit and its verdict are: `strangers PEOPLE.bin [CASE] [FIRST] [COUNT] [OUT]` fits scans of people with
+//! other sliders than the model's own (`python -m toile_body.strangers` writes them; same family of shapes, so easier than
+//! real people) and prints a line for each and the quantiles. Fits that miss are written to the folder OUT.
 //!
 //! Cases: `patchy` (a fifth of the surface missing, 2 mm of noise), `full`, `half` (missing), `front` (one Kinect v2
 //! view), `wild` (as patchy, in poses twice as varied), `wilder` (three times), `chair` (one attached), `two` (people).

@@ -1,5 +1,6 @@
-//! People that the model was not made from: other seeds and wider local sliders of the same source of shapes, other poses, noise, a
-//! fifth of the surface missing. `tests/data/strangers6.bin` holds the first six of the two hundred that
+//! People of other sliders than the model's own: other seeds, wider local sliders, other poses, noise, a fifth of the
+//! surface missing. They are of the same parametric family as the model's people, not real people, so the figures here are
+//! lower limits of the error on real scans. `tests/data/strangers6.bin` holds the first six of the two hundred that
 //! `python -m toile_body.strangers` writes; `examples/strangers.rs` runs all of them.
 
 mod common;

@@ -1,7 +1,8 @@
-"""People that the model was not made from: python -m toile_body.strangers WHEEL ASSET OUT [--count N] [--seed S] [--spread X].
+"""People of other sliders than the asset's: python -m toile_body.strangers WHEEL ASSET OUT [--count N] [--seed S] [--spread X].
 
-Other people than the asset's, with wider local sliders, in the A-pose: what the fit is tried on. Each is written as its best
-coefficients and what they leave over. Layout, little-endian: magic `TOILESTR`, u32 people, u32 vertices, u32 components, u32
+Other random people with wider local sliders, in the A-pose: what the fit is tried on. They are of the same parametric family
+as the asset's people, so they are easier to fit than real people. Each is written as its best coefficients and what they
+leave over. Layout, little-endian: magic `TOILESTR`, u32 people, u32 vertices, u32 components, u32
 joints; then for each person f32 coefficients, f32 rest joints (x y z, metres), f32 step (metres), i8 rest of each coordinate
 in steps.
 """

@@ -1,4 +1,5 @@
-//! People that the model was not made from (`character/generator`, `toile_body.strangers`), posed and scanned.
+//! People of other sliders than the model's own (`character/generator`, `toile_body.strangers`), posed and scanned. They are
+//! of the same family of shapes as the model, so they are easier to fit than real people.
 #![allow(dead_code)] // each user takes a part
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
