@@ -15,16 +15,16 @@ pub(crate) const TAPE_WIDTH: f64 = 0.02;
 /// How far above and below the nipple, and to its sides, the most forward point of the breast is searched, metres: about
 /// half the height of a breast.
 const BREAST: f64 = 0.04;
-/// How far above and below the template's point the most prominent point of the buttocks is searched, metres: about half
+/// How far above and below the template's point the most prominent point of the buttocks is searched, metres: a third of
 /// the height of the buttocks.
-const BUTTOCK: f64 = 0.08;
+const BUTTOCK: f64 = 0.05;
 /// How much of a prominence is given up for nearness to the template's point, metres for each square metre. A breast and
 /// a buttock have radii of some 6 and 10 cm in profile, so that they fall off by 8 and 5 metres for each square metre: the
-/// levels of clear prominences move by two fifths and a sixth of their distance from the template's points, which are at
-/// most a centimetre or two away. Flat ones, where a millimetre of noise would move them by centimetres, stay near those
-/// points, and so does the chest of a person whose belly is farther forward than the breast.
+/// level of a clear prominence moves by two fifths of its distance from the template's point, which is a centimetre or two
+/// away. A flat one, which a millimetre of noise would move by centimetres, stays near that point, and so does the bust of a
+/// person whose belly is farther forward than the breast.
 const BREAST_PULL: f64 = 5.0;
-const BUTTOCK_PULL: f64 = 1.0;
+const BUTTOCK_PULL: f64 = 3.0;
 
 /// Heights above the soles, metres.
 #[derive(Debug, Clone, Copy)]
@@ -133,7 +133,7 @@ mod tests {
     fn a_clear_prominence_is_found_and_a_flat_one_stays_at_the_templates_point() {
         let bump = |y: f64| 0.1 - 5.0 * (y - 1.013).powi(2);
         let found = prominence(1.0, 0.08, BUTTOCK_PULL, bump);
-        assert!((found - 1.0 - 0.013 * 5.0 / 6.0).abs() < 1e-4, "{found}");
+        assert!((found - 1.0 - 0.013 * 5.0 / 8.0).abs() < 1e-4, "{found}");
         assert!((prominence(1.0, 0.08, BUTTOCK_PULL, |_| 0.1) - 1.0).abs() < 1e-9);
         let (low, high) = (prominence(1.0, 0.08, 2.0, |y| 0.05 * y), prominence(1.0, 0.08, 2.0, |y| 0.06 * y));
         assert!(low < high && high < 1.02, "a slope moves it a little, without jumps: {low} {high}");

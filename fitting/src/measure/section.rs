@@ -1,6 +1,7 @@
 //! Plane sections of a part of the body, and how a tape lies around and along them.
 
 use nalgebra::{Point2, Point3, Vector3};
+use toile_geometry::hull::{area_and_perimeter, convex_hull};
 
 /// A plane through `point` with unit `normal`.
 #[derive(Debug, Clone, Copy)]
@@ -174,39 +175,6 @@ fn around(piece: &[Point3<f64>], plane: &Plane) -> (f64, Tape) {
     (area, Tape { length, path })
 }
 
-/// Corners of the convex hull, counter-clockwise from the leftmost (Andrew's monotone chain).
-fn convex_hull(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    points.dedup();
-    if points.len() < 3 {
-        return points;
-    }
-    let mut hull: Vec<Point2<f64>> = Vec::with_capacity(2 * points.len());
-    let mut half = |points: &mut dyn Iterator<Item = &Point2<f64>>| {
-        let base = hull.len();
-        for p in points {
-            while hull.len() >= base + 2 && turn(&hull[hull.len() - 2], &hull[hull.len() - 1], p) <= 0.0 {
-                hull.pop();
-            }
-            hull.push(*p);
-        }
-        hull.pop();
-    };
-    half(&mut points.iter());
-    half(&mut points.iter().rev());
-    hull
-}
-
-fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
-    (b - a).perp(&(c - a))
-}
-
-fn area_and_perimeter(hull: &[Point2<f64>]) -> (f64, f64) {
-    let sides = (0..hull.len()).map(|i| (hull[i], hull[(i + 1) % hull.len()]));
-    let area = 0.5 * sides.clone().map(|(a, b)| a.coords.perp(&b.coords)).sum::<f64>();
-    (area, sides.map(|(a, b)| (b - a).norm()).sum())
-}
-
 #[cfg(test)]
 mod tests {
     use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -267,15 +235,5 @@ mod tests {
             skin(&waist).taut(&Point3::new(0.0, 0.999, 0.2), &Point3::new(0.0, 0.001, 0.2), &Vector3::z()).unwrap();
         assert!((bridge.length - 0.998).abs() < 1e-3, "{}", bridge.length);
         assert!(skin(&waist).taut(&Point3::origin(), &Point3::origin(), &Vector3::z()).is_none());
-    }
-
-    #[test]
-    fn a_dent_does_not_shorten_the_tape() {
-        let hull = convex_hull(
-            [(0.0, 0.0), (1.0, 0.0), (0.5, 0.2), (1.0, 1.0), (0.0, 1.0), (0.5, 0.9)]
-                .map(|(x, y)| Point2::new(x, y))
-                .to_vec(),
-        );
-        assert_eq!(area_and_perimeter(&hull), (1.0, 4.0));
     }
 }

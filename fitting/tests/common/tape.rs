@@ -128,13 +128,9 @@ fn trunk(brute: &BruteForce) -> Vec<(String, f64)> {
         nalgebra::center(&brute.landmark(&format!("left {name}")), &brute.landmark(&format!("right {name}")))
     };
     let waist = 0.5 * (both("lowest rib point").y + both("highest point of the hip bone").y);
-    let hip =
-        brute.extreme(&keep, (brute.landmark("crotch point").y, both("highest point of the hip bone").y), |p| -p.z).y;
-    let nipple = both("nipple").y;
+    let height = |name: &str| brute.table.value(name).expect("the level was found");
+    let (bust, hip) = (height("bust height"), height("hip height"));
     let armpit = brute.landmark("left armpit point").y.min(brute.landmark("right armpit point").y) - 0.02;
-    let bust = brute.table.value("bust height").expect("the bust was found");
-    assert!((bust - nipple).abs() < 0.041, "bust {bust}, nipples {nipple}");
-    assert!(brute.table.value("hip height").is_some_and(|h| (h - hip).abs() < 0.04), "hip {hip}");
     let chest = (0..200).map(|k| brute.level(&keep, bust + (armpit - bust) * f64::from(k) / 199.0)).fold(0.0, f64::max);
     [
         ("chest girth", chest),
@@ -145,6 +141,25 @@ fn trunk(brute: &BruteForce) -> Vec<(String, f64)> {
     ]
     .map(|(name, girth)| (name.to_string(), girth))
     .into()
+}
+
+/// How much farther back the rearmost vertex near the buttocks is than the trunk at the table's hip level, and how much
+/// farther forward the foremost vertex near the nipples is than the table's bust points, metres.
+pub fn prominence_given_up(model: &BodyModel, body: &SkinnedMesh, table: &MeasureTable) -> [f64; 2] {
+    let brute = BruteForce { model, body, table };
+    let keep = brute.without_arms();
+    let (crotch, hip) = (brute.landmark("crotch point").y, table.value("hip height").expect("the hip was found"));
+    let bone = brute.landmark("left highest point of the hip bone").y;
+    let rearmost = -brute.extreme(&keep, (crotch, bone), |p| -p.z).z;
+    let at_level = |y: f64, score: &dyn Fn(&Point3<f64>) -> f64| {
+        let points = brute.cut(&keep, &Point3::new(0.0, y, 0.0), &Vector3::y());
+        points.iter().map(score).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let nipple = brute.landmark("left nipple");
+    let bust = table.value("bust height").expect("the bust was found");
+    let before = |p: &Point3<f64>| if (p.x - nipple.x).abs() < 0.04 { p.z } else { f64::NEG_INFINITY };
+    let foremost = before(&brute.extreme(&keep, (nipple.y - 0.03, nipple.y + 0.03), before));
+    [rearmost - at_level(hip, &|p| -p.z), foremost - at_level(bust, &before)]
 }
 
 fn leg(brute: &BruteForce, side: &str) -> [(&'static str, f64); 5] {

@@ -9,9 +9,9 @@ use toile_pipeline::body_file::read_json;
 use crate::{StudioError, commands::fit::Person, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
-Girths as a taut tape lies, heights above the soles, standing straight. Fits the body first where that is missing.
-measurements.csv has a line a measurement: name, kind, value, unit, height of the tape's middle above the soles (cm);
-measurements.json also has where each tape lies, and the landmarks.
+Girths as a taut tape lies, heights above the soles, standing straight. Fits the body first where it has not been fitted.
+measurements.csv has a line for each measurement: name, kind, value, unit, height of the tape's middle above the soles (cm),
+definition; measurements.json also has where each tape lies, and the landmarks. docs/measurements.md explains them all.
 
 Examples:
   toile measure anna
