@@ -39,6 +39,7 @@ mod error;
 pub mod file;
 pub mod handles;
 pub mod holes;
+pub mod hull;
 pub mod intersection;
 pub mod lanes;
 pub mod laplacian;

@@ -24,13 +24,13 @@ pub fn keep_negative(mesh: &Mesh, scalar: &[f32]) -> Mesh {
     Mesh::new(cutter.positions, triangles).filter_triangles(|_| true).0
 }
 
-/// Drops components with less than `share` of the vertices.
+/// Drops components with fewer vertices than `share` of all.
 pub fn drop_crumbs(mesh: &Mesh, share: f32) -> Mesh {
     let (component, count) = vertex_components(mesh.positions.len(), &mesh.triangles);
     let mut sizes = vec![0usize; count];
     component.iter().for_each(|&c| sizes[c as usize] += 1);
-    let least = (share * mesh.positions.len() as f32) as usize;
-    mesh.filter_triangles(|t| sizes[component[mesh.triangles[t][0] as usize] as usize] >= least).0
+    let smallest = (share * mesh.positions.len() as f32) as usize;
+    mesh.filter_triangles(|t| sizes[component[mesh.triangles[t][0] as usize] as usize] >= smallest).0
 }
 
 struct Cutter<'a> {

@@ -7,7 +7,7 @@ use toile_geometry::{Mesh, bvh::Bvh, mesh::triangle_normals, topology::VertexNei
 
 use crate::{garment::Garment, person::Person};
 
-/// Least distance of cloth from what is below in any pose, metres.
+/// Smallest distance of cloth from the layers below in any pose, metres.
 const CLEARANCE: f32 = 0.003;
 /// Cloth deeper than this belongs to another part of the body, metres.
 const DEEPEST: f32 = 0.03;

@@ -8,11 +8,11 @@ pub enum SyntheticError {
     Setting {
         /// Name of the setting.
         name: &'static str,
-        /// What is wrong and what is allowed.
+        /// Why it cannot be used, and which values are allowed.
         reason: String,
     },
-    /// There is no such take.
-    #[error("take {take}: the subject has takes 0 to {last}")]
+    /// The subject has no take of this number.
+    #[error("the subject has no take {take}: its takes are 0 to {last}")]
     NoTake {
         /// The take asked for.
         take: usize,
@@ -24,7 +24,7 @@ pub enum SyntheticError {
     Garment {
         /// Its name.
         name: String,
-        /// What is wrong.
+        /// Why not.
         reason: String,
     },
     /// The body asset cannot be used.

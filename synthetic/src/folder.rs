@@ -8,26 +8,24 @@ use toile_capture::{ColorImage, DepthImage, atomic_write};
 
 use crate::{SyntheticError, sensor::DEPTH_SCALE, settings::SyntheticSettings, subject::Subject, take::Take, truth};
 
-/// Writes every take of the subject that `settings` describe: `DIR/NN-layer/` with depth/, color/, camera.json,
+/// Writes every take of a subject: `DIR/NN-layer/` with depth/, color/, camera.json,
 /// timestamps.txt and truth/, and `DIR/subject.json`.
 ///
 /// # Errors
-/// [`SyntheticError`] where a setting is out of range or a file cannot be written.
+/// [`SyntheticError`] where a garment cannot be made or a file cannot be written.
 pub fn write_subject_folder(
-    settings: &SyntheticSettings,
+    subject: &Subject,
     dir: &Path,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<(), SyntheticError> {
-    let subject = Subject::new(settings)?;
     for n in 0..subject.take_count() {
         let take = subject.take(n)?;
         let share = 1.0 / subject.take_count() as f32;
         let folder = dir.join(&take.name);
-        write_frames(&take, settings, &folder, &|p| progress((n as f32 + 0.9 * p) * share))?;
-        truth::write(&take, &folder.join("truth"))?;
+        write_frames(&take, &subject.settings, &folder, &|p| progress((n as f32 + 0.9 * p) * share))?;
+        truth::write_take(&take, dir)?;
     }
-    let text = format!("{:#}\n", truth::subject_json(&subject));
-    atomic_write(&dir.join("subject.json"), text.as_bytes())?;
+    truth::write_person(subject, dir)?;
     progress(1.0);
     Ok(())
 }

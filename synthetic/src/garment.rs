@@ -4,7 +4,7 @@
 //! tubes where it drapes, less the garment's ease, and never nearer to the layers below than a gap. The level is meshed,
 //! cut where the garment ends, creased outwards and given the body's weights.
 
-use nalgebra::{Point2, Point3};
+use nalgebra::Point3;
 use rayon::prelude::*;
 use toile_character::{BodyModel, SkinWeights, SkinnedMesh, transfer::closest_triangle_weights};
 use toile_geometry::{Mesh, topology::VertexNeighbors};
@@ -17,11 +17,12 @@ use crate::{
     random::Random,
     settings::{GarmentKind, GarmentSettings, SyntheticSettings},
     surface_nets,
-    tailor::{Limb, Tailoring},
-    tape::convex_hull,
+    tailor::tailor,
+    tailoring::{Limb, Tailoring},
+    tubes::Tubes,
 };
 
-/// Least distance between two layers as they are made, metres.
+/// Smallest distance between two layers as they are made, metres.
 const GAP: f32 = 0.005;
 /// Space around the body that cloth may fill, metres.
 const MARGIN: f32 = 0.14;
@@ -64,7 +65,7 @@ pub fn make_all(
     let mut garments = Vec::new();
     for (n, wanted) in settings.garments.iter().enumerate() {
         let mut random = Random::new(settings.seed, &format!("garment {n} {}", wanted.kind.name()));
-        let tailoring = Tailoring::new(wanted.kind, model, person, &mut random);
+        let tailoring = tailor(wanted.kind, model, person, &mut random);
         garments.push(wardrobe.add(wanted, &tailoring, random.seed())?);
     }
     Ok(garments)
@@ -154,59 +155,12 @@ fn ease_at(cut_to: &Tailoring, p: &Point3<f32>) -> f32 {
     cut_to.ease + cut_to.flare * below + cut_to.pleats * share * fold
 }
 
-/// Creases stand outwards only, so that they never touch what is below.
+/// Creases stand outwards only, so that they never touch the layers below.
 fn crease(mesh: &mut Mesh, cut_to: &Tailoring, seed: u64) {
     let normals = mesh.vertex_normals();
     for (p, n) in mesh.positions.iter_mut().zip(normals) {
         let wave = noise::layered(p, cut_to.crease_length, seed);
         *p += n * (cut_to.creases * (0.5 + 0.7 * wave).clamp(0.0, 1.0));
-    }
-}
-
-/// What cloth hangs down from: for each level of the grid the convex hull of everything above it (below `drape_from`).
-struct Tubes {
-    hulls: Vec<Vec<Point2<f64>>>,
-}
-
-impl Tubes {
-    fn new(person: &Person, grid: &Grid, cut_to: &Tailoring) -> Self {
-        let mut hulls = vec![Vec::new(); grid.dims[1]];
-        if cut_to.drape <= 0.0 {
-            return Self { hulls };
-        }
-        let trunk = |v: &usize| Limb::of(person.regions[*v]) == Limb::Trunk;
-        let body = &person.body.mesh.positions;
-        let points: Vec<&Point3<f32>> = (0..body.len()).filter(trunk).map(|v| &body[v]).collect();
-        let mut hull: Vec<Point2<f64>> = Vec::new();
-        for level in (0..grid.dims[1]).rev() {
-            let y = grid.position([0, level, 0]).y;
-            if y > cut_to.drape_from {
-                continue;
-            }
-            let new = points.iter().filter(|p| (p.y - y).abs() <= 0.75 * grid.cell);
-            hull.extend(new.map(|p| Point2::new(f64::from(p.x), f64::from(p.z))));
-            hull = convex_hull(&mut hull);
-            hulls[level].clone_from(&hull);
-        }
-        Self { hulls }
-    }
-
-    /// Signed distance in the plane to the tube at a level; infinite where there is none.
-    fn distance(&self, level: usize, p: &Point3<f32>) -> f32 {
-        let hull = &self.hulls[level];
-        if hull.len() < 3 {
-            return f32::INFINITY;
-        }
-        let p = Point2::new(f64::from(p.x), f64::from(p.z));
-        let (mut inside, mut outside) = (f64::NEG_INFINITY, f64::INFINITY);
-        for (a, b) in hull.iter().zip(hull.iter().cycle().skip(1)) {
-            let side = b - a;
-            let length = side.norm().max(1e-9);
-            inside = inside.max((p - a).perp(&side) / length);
-            let along = ((p - a).dot(&side) / (length * length)).clamp(0.0, 1.0);
-            outside = outside.min((p - (a + side * along)).norm());
-        }
-        (if inside <= 0.0 { inside } else { outside }) as f32
     }
 }
 

@@ -8,37 +8,46 @@
 //! - [`sensor`]: Kinect v1, Kinect v2 and active stereo as noise on the true depth;
 //! - [`truth`]: surfaces with layers, poses and measurements, for scoring;
 //! - [`folder::write_subject_folder`]: a subject as folders of images that `toile import` reads, with the truth;
-//! - [`record::record_subject`]: a subject as a subject folder with recordings.
+//! - [`record::record_subject`]: a subject as a subject folder with recordings, and the truth under `truth/`.
 //!
 //! Room: +Y up, origin where the disk's axis meets its top, the camera on the +Z side. The subject's frame turns with
 //! the disk and equals the room's at the first frame.
 
-pub mod cut;
+mod cut;
 pub mod dressing;
-pub mod error;
-pub mod field;
+mod error;
+mod field;
 pub mod folder;
-pub mod garment;
-pub mod noise;
-pub mod pattern;
-pub mod person;
-pub mod posture;
-pub mod random;
+mod garment;
+mod noise;
+mod pattern;
+mod person;
+mod posture;
+mod random;
 pub mod record;
 pub mod room;
 pub mod sensor;
-pub mod settings;
-pub mod subdivide;
-pub mod subject;
-pub mod surface_nets;
-pub mod tailor;
-pub mod take;
-pub mod tape;
+mod settings;
+mod subdivide;
+mod subject;
+mod surface;
+mod surface_nets;
+mod tailor;
+mod tailoring;
+mod take;
+mod tape;
 pub mod truth;
-pub mod turntable;
+mod tubes;
+mod turntable;
+mod view;
 
 pub use error::SyntheticError;
+pub use garment::Garment;
+pub use person::Person;
 pub use sensor::SensorPreset;
 pub use settings::{GarmentKind, GarmentSettings, Pattern, Sex, SyntheticSettings};
 pub use subject::Subject;
-pub use take::{Surface, Take};
+pub use surface::Surface;
+pub use take::Take;
+pub use tape::{Girth, Girths};
+pub use turntable::{Bend, Moment};

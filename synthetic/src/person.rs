@@ -29,7 +29,8 @@ pub struct Person {
     pub skin: SkinnedMesh,
     /// Region of each of its vertices.
     pub skin_regions: Vec<Region>,
-    /// Standing height, metres.
+    /// Height of the body at rest, metres, until a caller that can stand it straight (`toile synthesize` does) writes the
+    /// stature here.
     pub stature_m: f64,
     /// Girths at rest.
     pub girths: Girths,
@@ -39,7 +40,7 @@ impl Person {
     /// Draws a person.
     ///
     /// # Errors
-    /// [`SyntheticError::Setting`] where the shape is no body that can be measured.
+    /// [`SyntheticError::Setting`] where the shape cannot be measured as a body.
     pub fn new(model: &BodyModel, settings: &SyntheticSettings) -> Result<Self, SyntheticError> {
         let beta = random_beta(model, settings);
         let mut body = model.skinned(&beta);

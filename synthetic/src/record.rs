@@ -1,19 +1,21 @@
-//! A subject as recordings.
+//! A subject as recordings, with the truth beside.
 
 use std::path::Path;
 
 use toile_capture::{Recorder, RecorderOptions, RecordingSummary, subject::BODY};
 use toile_character::GarmentType;
 
-use crate::{SyntheticError, subject::Subject, take::Take};
+use crate::{SyntheticError, subject::Subject, take::Take, truth};
 
-/// Records every take of a subject into a new subject folder: subject.toml and takes/NN-layer.mcap.
+/// Records every take of a subject into a new subject folder: subject.toml and takes/NN-layer.mcap. Where `truth` names a
+/// folder, what is true of the subject is written there ([`truth`](crate::truth)).
 ///
 /// # Errors
 /// [`SyntheticError`] where `folder` is a subject already, or a file cannot be written.
 pub fn record_subject(
     subject: &Subject,
     folder: &Path,
+    truth: Option<&Path>,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Vec<RecordingSummary>, SyntheticError> {
     let mut entry = toile_capture::LockedSubject::create(folder)?;
@@ -28,6 +30,12 @@ pub fn record_subject(
         let options = RecorderOptions { replace_part: true, ..RecorderOptions::default() };
         summaries.push(record_take(&take, &pending.path, options, &|p| progress((n as f32 + p) * share))?);
         entry.accept(pending)?;
+        if let Some(truth) = truth {
+            truth::write_take(&take, truth)?;
+        }
+    }
+    if let Some(truth) = truth {
+        truth::write_person(subject, truth)?;
     }
     entry.set_rig(&format!("synthetic {}", subject.settings.sensor.name()))?;
     Ok(summaries)

@@ -7,7 +7,6 @@ use crate::{
     garment::{self, Garment},
     person::Person,
     settings::SyntheticSettings,
-    take::Take,
 };
 
 /// A person with a wardrobe, ready to be recorded.
@@ -37,16 +36,5 @@ impl Subject {
     /// How many takes there are: the body and one a garment.
     pub fn take_count(&self) -> usize {
         self.garments.len() + 1
-    }
-
-    /// The scene of take `index`.
-    ///
-    /// # Errors
-    /// [`SyntheticError::NoTake`] where there are not so many.
-    pub fn take(&self, index: usize) -> Result<Take, SyntheticError> {
-        if index >= self.take_count() {
-            return Err(SyntheticError::NoTake { take: index, last: self.take_count() - 1 });
-        }
-        Ok(Take::new(self, index))
     }
 }

@@ -1,154 +1,31 @@
-//! How each kind of garment is cut: where it ends, how it hangs, how it creases.
+//! How each kind of garment is cut for a person.
 
 use nalgebra::{Point3, Vector3};
-use toile_character::{BodyModel, Joint, Region};
+use toile_character::{BodyModel, Joint};
 
-use crate::{person::Person, random::Random, settings::GarmentKind};
+use crate::{
+    person::Person,
+    random::Random,
+    settings::GarmentKind,
+    tailoring::{Neckline, Plane, Tailoring},
+};
 
-/// What counts as clearly outside or inside a garment's extent, metres.
-const FAR: f32 = 0.05;
-
-/// What part of the body a place belongs to, as far as tailoring cares.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Limb {
-    /// Trunk, legs, neck and head.
-    Trunk,
-    /// Left arm and hand.
-    LeftArm,
-    /// Right arm and hand.
-    RightArm,
-}
-
-impl Limb {
-    /// The limb of a body region.
-    pub fn of(region: Region) -> Self {
-        match region {
-            Region::LeftArm | Region::LeftHand => Self::LeftArm,
-            Region::RightArm | Region::RightHand => Self::RightArm,
-            _ => Self::Trunk,
-        }
-    }
-}
-
-/// A half space: `normal` points out of the garment.
-#[derive(Debug, Clone, Copy)]
-struct Plane {
-    point: Point3<f32>,
-    normal: Vector3<f32>,
-}
-
-impl Plane {
-    fn outside(&self, p: &Point3<f32>) -> f32 {
-        (p - self.point).dot(&self.normal)
-    }
-
-    fn mirrored(&self) -> Self {
-        let flip = Vector3::new(-1.0, 1.0, 1.0);
-        Self { point: Point3::from(self.point.coords.component_mul(&flip)), normal: self.normal.component_mul(&flip) }
-    }
-}
-
-/// Where a top ends around the neck: a ball around the root of the neck, and everything above the collar.
-#[derive(Debug, Clone, Copy)]
-struct Neckline {
-    center: Point3<f32>,
-    radius: f32,
-    highest: f32,
-}
-
-impl Neckline {
-    /// From this far beside the axis the collar may rise with the shoulders, metres.
-    const COLLAR: f32 = 0.07;
-    /// How steeply it may rise.
-    const RISE: f32 = 0.7;
-
-    fn outside(&self, p: &Point3<f32>) -> f32 {
-        let beside = ((p.x - self.center.x).abs() - Self::COLLAR).max(0.0);
-        let above = p.y - self.highest - Self::RISE * beside;
-        (self.radius - (p - self.center).norm()).max(above)
-    }
-}
-
-/// A garment's cut for one person at rest.
-#[derive(Debug, Clone)]
-pub struct Tailoring {
-    /// Trunk: upper and lower ends, each a plane.
-    ends: Vec<Plane>,
-    /// Around the neck, for tops.
-    neckline: Option<Neckline>,
-    /// What a scarf stays within: the middle of the neck's root and a distance from it.
-    within: Option<(Point3<f32>, f32)>,
-    /// Where the legs end (left and right), if the garment has legs.
-    legs: Option<[Plane; 2]>,
-    /// Where the sleeves end; without them the arms are left out.
-    sleeves: Option<[Plane; 2]>,
-    /// Half the width of the open front, metres, and the depth (z) in front of which it is cut.
-    opening: Option<(f32, f32)>,
-    /// Distance from what is below, metres.
-    pub ease: f32,
-    /// 0 follows the body, 1 hangs straight down from `drape_from`.
-    pub drape: f32,
-    /// Height that the cloth hangs down from, metres.
-    pub drape_from: f32,
-    /// Further ease a metre below `drape_from`.
-    pub flare: f32,
-    /// Depth of pleats at the lower end, metres.
-    pub pleats: f32,
-    /// Height of the lower end, metres.
-    pub lower_end: f32,
-    /// Highest crease, metres.
-    pub creases: f32,
-    /// Length of creases along x, y, z, metres.
-    pub crease_length: Vector3<f32>,
-}
-
-impl Tailoring {
-    /// Measures `person` for a garment; sizes vary a little with `random`.
-    pub fn new(kind: GarmentKind, model: &BodyModel, person: &Person, random: &mut Random) -> Self {
-        let measure = Measure { model, person };
-        let vary = random.range(-1.0, 1.0) as f32;
-        match kind {
-            GarmentKind::Trousers => measure.bottoms(0.93 + 0.01 * vary, 0.010, 0.025),
-            GarmentKind::Shorts => measure.bottoms(0.42 + 0.03 * vary, 0.011, 0.05),
-            GarmentKind::Skirt => measure.skirt(0.9 + 0.06 * vary),
-            GarmentKind::Tshirt => measure.top(0.38 + 0.02 * vary, 0.05, 0.010, 0.6),
-            GarmentKind::Blouse => measure.top(0.86 + 0.02 * vary, 0.03, 0.010, 0.6),
-            GarmentKind::Jumper => measure.top(0.92, 0.045, 0.013, 0.8),
-            GarmentKind::Jacket => measure.open_top(0.93, 0.07, 0.014),
-            GarmentKind::Coat => measure.coat(0.94),
-            GarmentKind::Dress => measure.dress(0.22 + 0.03 * vary),
-            GarmentKind::Scarf => measure.scarf(),
-            GarmentKind::Hat => measure.hat(),
-        }
-    }
-
-    /// How far a place lies outside the garment's extent, metres; negative inside. Beyond limits of the same limb the
-    /// value is exact near its zero.
-    pub fn outside(&self, p: &Point3<f32>, limb: Limb) -> f32 {
-        let arm = match limb {
-            Limb::Trunk => None,
-            Limb::LeftArm => Some(0),
-            Limb::RightArm => Some(1),
-        };
-        if let Some(side) = arm {
-            return self.sleeves.as_ref().map_or(FAR, |s| s[side].outside(p).clamp(-FAR, FAR));
-        }
-        let mut out = self.ends.iter().map(|end| end.outside(p)).fold(-FAR, f32::max);
-        if let Some(neckline) = &self.neckline {
-            out = out.max(neckline.outside(p));
-        }
-        if let Some((center, radius)) = &self.within {
-            out = out.max((p - center).norm() - radius);
-        }
-        if let Some(legs) = &self.legs {
-            out = out.max(legs[usize::from(p.x < 0.0)].outside(p));
-        }
-        if let Some((half_width, front)) = self.opening
-            && p.z > front
-        {
-            out = out.max(half_width - p.x.abs());
-        }
-        out.min(FAR)
+/// Measures `person` for a garment; sizes vary a little with `random`.
+pub(crate) fn tailor(kind: GarmentKind, model: &BodyModel, person: &Person, random: &mut Random) -> Tailoring {
+    let measure = Measure { model, person };
+    let vary = random.range(-1.0, 1.0) as f32;
+    match kind {
+        GarmentKind::Trousers => measure.bottoms(0.93 + 0.01 * vary, 0.010, 0.025),
+        GarmentKind::Shorts => measure.bottoms(0.42 + 0.03 * vary, 0.011, 0.05),
+        GarmentKind::Skirt => measure.skirt(0.9 + 0.06 * vary),
+        GarmentKind::Tshirt => measure.top(0.38 + 0.02 * vary, 0.05, 0.010, 0.6),
+        GarmentKind::Blouse => measure.top(0.86 + 0.02 * vary, 0.03, 0.010, 0.6),
+        GarmentKind::Jumper => measure.top(0.92, 0.045, 0.013, 0.8),
+        GarmentKind::Jacket => measure.open_top(0.93, 0.07, 0.014),
+        GarmentKind::Coat => measure.coat(0.94),
+        GarmentKind::Dress => measure.dress(0.22 + 0.03 * vary),
+        GarmentKind::Scarf => measure.scarf(),
+        GarmentKind::Hat => measure.hat(),
     }
 }
 

@@ -1,9 +1,12 @@
-//! Stature and girths by the tape's rule: convex-hull perimeters of the torso's sections.
+//! Height and scored girths of a body: perimeters of the convex hulls of the trunk's sections.
 
 use nalgebra::Point2;
 use serde::Serialize;
 use toile_character::Region;
-use toile_geometry::Mesh;
+use toile_geometry::{
+    Mesh,
+    hull::{area_and_perimeter, convex_hull},
+};
 
 /// Distance between two sections that are tried, as a share of stature.
 const STEP: f64 = 0.001;
@@ -22,7 +25,7 @@ pub struct Girth {
 pub struct Girths {
     /// The largest at 70–73.5 % of stature.
     pub chest: Girth,
-    /// The least at 57–66 %.
+    /// The smallest at 57–66 %.
     pub waist: Girth,
     /// The largest at 47–55 %.
     pub hip: Girth,
@@ -61,46 +64,6 @@ fn girth_at(body: &Mesh, y: f64) -> Option<f64> {
             }
         }
     }
-    let hull = convex_hull(&mut points);
-    let sides = hull.iter().zip(hull.iter().cycle().skip(1));
-    (hull.len() > 2).then(|| sides.map(|(a, b)| (b - a).norm()).sum())
-}
-
-/// Convex hull, counter-clockwise (Andrew 1979). Sorts `points`.
-pub fn convex_hull(points: &mut Vec<Point2<f64>>) -> Vec<Point2<f64>> {
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    points.dedup();
-    let turn = |a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>| (b - a).perp(&(c - a));
-    let chain = |ordered: &mut dyn Iterator<Item = &Point2<f64>>| {
-        let mut chain: Vec<Point2<f64>> = Vec::new();
-        for p in ordered {
-            while chain.len() > 1 && turn(&chain[chain.len() - 2], &chain[chain.len() - 1], p) <= 0.0 {
-                chain.pop();
-            }
-            chain.push(*p);
-        }
-        chain.pop();
-        chain
-    };
-    let mut hull = chain(&mut points.iter());
-    hull.extend(chain(&mut points.iter().rev()));
-    hull
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_hull_of_a_star_is_its_outline() {
-        let star = |i: usize| {
-            let (sin, cos) = (std::f64::consts::TAU * i as f64 / 16.0).sin_cos();
-            let r = if i.is_multiple_of(2) { 2.0 } else { 0.7 };
-            Point2::new(r * cos, r * sin)
-        };
-        let hull = convex_hull(&mut (0..16).map(star).collect());
-        assert_eq!(hull.len(), 8);
-        let length: f64 = hull.iter().zip(hull.iter().cycle().skip(1)).map(|(a, b)| (b - a).norm()).sum();
-        assert!((length - 8.0 * 4.0 * (std::f64::consts::PI / 8.0).sin()).abs() < 1e-9);
-    }
+    let hull = convex_hull(points);
+    (hull.len() > 2).then(|| area_and_perimeter(&hull).1)
 }

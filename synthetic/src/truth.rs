@@ -1,4 +1,4 @@
-//! What is true of a take, in the files that the scoring scripts read.
+//! What is true of a take and of its person, as files (`docs/synthetic.md`).
 
 use std::path::Path;
 
@@ -13,23 +13,23 @@ use toile_character::joint::JOINTS;
 use toile_geometry::{Mesh, ply};
 use toile_render::{Camera, rasterize};
 
-use crate::{
-    SyntheticError,
-    subject::Subject,
-    take::{Surface, Take},
-};
+use crate::{SyntheticError, subject::Subject, surface::Surface, take::Take};
 
 /// A triangle counts as seen when it is no more than this behind the depth of its pixel, metres.
 const BEHIND: f32 = 0.004;
-/// Least cosine between ray and normal of a triangle that counts as seen.
+/// Smallest cosine between ray and normal of a triangle that counts as seen.
 const GRAZING: f32 = 0.08;
 
-/// For each triangle of the take's surface, whether any frame of the take sees it.
+/// Frames of a long take that are looked at, evenly spread over it.
+const LOOKS: usize = 180;
+
+/// For each triangle of the take's surface, whether a frame of the take sees it. Of a long take, 180 to 359 frames are
+/// looked at.
 pub fn visible(take: &Take) -> Vec<bool> {
     let mesh = &take.surface.mesh;
     let normals = mesh.triangle_normals();
     let mut seen = vec![false; mesh.triangles.len()];
-    for (index, moment) in take.moments.iter().enumerate() {
+    for (index, moment) in take.moments.iter().enumerate().step_by((take.moments.len() / LOOKS).max(1)) {
         let bent = Mesh::new(take.bend.apply(&mesh.positions, moment), mesh.triangles.clone());
         let camera_from_world = take.subject_from_camera(index).inverse();
         let camera = Camera { lens: take.camera(), camera_from_world };
@@ -64,27 +64,34 @@ fn is_seen(mesh: &Mesh, t: usize, normal: &Vector3<f32>, camera: &Camera, depth:
 /// [`SyntheticError::Capture`] names the file that could not be written.
 pub fn write_subject(subject: &Subject, dir: &Path) -> Result<(), SyntheticError> {
     for n in 0..subject.take_count() {
-        let take = subject.take(n)?;
-        write(&take, &dir.join(&take.name).join("truth"))?;
+        write_take(&subject.take(n)?, dir)?;
     }
+    write_person(subject, dir)
+}
+
+/// Writes what is true of the person: `DIR/subject.json`.
+///
+/// # Errors
+/// [`SyntheticError::Capture`] names the file that could not be written.
+pub fn write_person(subject: &Subject, dir: &Path) -> Result<(), SyntheticError> {
     let text = format!("{:#}\n", subject_json(subject));
     Ok(atomic_write(&dir.join("subject.json"), text.as_bytes())?)
 }
 
-/// Writes a take's truth into `folder`: surface.ply, body.ply or garment_n.ply, poses.txt, pose.json, sway.txt.
+/// Writes a take's truth into `DIR/NN-layer/truth/`: surface.ply, body.ply, garment_n.ply, poses.txt, pose.json, sway.txt.
 ///
 /// # Errors
 /// [`SyntheticError::Capture`] names the file that could not be written.
-pub fn write(take: &Take, folder: &Path) -> Result<(), SyntheticError> {
+pub fn write_take(take: &Take, dir: &Path) -> Result<(), SyntheticError> {
+    let folder = dir.join(&take.name).join("truth");
     let visible = visible(take);
     let put = |name: &str, bytes: &[u8]| atomic_write(&folder.join(name), bytes);
     put("surface.ply", &encode_surface(&take.surface, &visible, take.index > 0))?;
-    if take.index == 0 {
-        put("body.ply", &ply::encode(&take.body))?;
-    } else {
-        let garment = |t: usize| usize::from(take.surface.layer[t]) == take.index;
-        let plain = Mesh { normals: Vec::new(), ..take.surface.mesh.clone() };
-        put(&format!("garment_{}.ply", take.index), &ply::encode(&plain.filter_triangles(garment).0))?;
+    put("body.ply", &ply::encode(&take.body))?;
+    if let Some(layer) = u8::try_from(take.index).ok().filter(|n| *n > 0) {
+        let (garment, triangles) = take.surface.only(layer);
+        let seen: Vec<bool> = triangles.iter().map(|&t| visible[t]).collect();
+        put(&format!("garment_{layer}.ply"), &encode_surface(&garment, &seen, true))?;
     }
     put("poses.txt", poses_text(take).as_bytes())?;
     put("pose.json", pose_json(take).to_string().as_bytes())?;
@@ -138,10 +145,22 @@ fn poses_text(take: &Take) -> String {
 
 fn pose_json(take: &Take) -> Value {
     let joints = take.joint_positions();
-    let named: serde_json::Map<String, Value> =
-        JOINTS.iter().map(|j| (j.name().to_string(), json!(joints[j.index()].coords.as_slice()))).collect();
+    let angles = JOINTS.iter().map(|&j| (j.name().to_string(), json!(take.pose.rotation(j).scaled_axis().as_slice())));
     let height = take.body.bounds().map_or(0.0, |(lo, hi)| hi.y - lo.y);
-    json!({ "take": take.name, "joints": named, "posed_height_m": height })
+    json!({
+        "take": take.name,
+        "joints": by_name(&joints),
+        "theta": {
+            "translation": take.pose.translation.as_slice(),
+            "rotations": angles.collect::<serde_json::Map<String, Value>>(),
+        },
+        "posed_height_m": height,
+    })
+}
+
+/// Joint positions by VRM name.
+fn by_name(joints: &[Point3<f64>]) -> serde_json::Map<String, Value> {
+    JOINTS.iter().map(|j| (j.name().to_string(), json!(joints[j.index()].coords.as_slice()))).collect()
 }
 
 fn sway_text(take: &Take) -> String {
@@ -153,7 +172,7 @@ fn sway_text(take: &Take) -> String {
     text
 }
 
-/// What is true of the person: stature, girths, takes.
+/// What is true of the person: stature, girths, shape, joints at rest, takes, and the settings that it was made from.
 pub fn subject_json(subject: &Subject) -> Value {
     let takes: Vec<String> = (0..subject.take_count()).map(|n| subject.settings.take_name(n)).collect();
     let volume = subject.person.body.mesh.signed_volume() * 1e3;
@@ -166,6 +185,7 @@ pub fn subject_json(subject: &Subject) -> Value {
         "volume_l": volume,
         "girths": subject.person.girths,
         "beta": subject.person.beta,
+        "rest_joints": by_name(&subject.person.body.skeleton.rest),
         "settings": subject.settings,
     })
 }

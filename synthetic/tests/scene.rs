@@ -6,7 +6,8 @@ use nalgebra::Point3;
 use toile_capture::import;
 use toile_geometry::{bvh::Bvh, transform_point};
 use toile_synthetic::{
-    GarmentKind, GarmentSettings, Sex, Subject, SyntheticError, SyntheticSettings, dressing::Collider, folder, truth,
+    GarmentKind, GarmentSettings, Sex, Subject, SyntheticError, SyntheticSettings, dressing::Collider, folder, record,
+    truth,
 };
 
 fn settings() -> SyntheticSettings {
@@ -165,8 +166,9 @@ fn folders_are_read_by_import() {
     let dir = tempfile::tempdir().unwrap();
     let garments = vec![GarmentSettings::of(GarmentKind::Shorts)];
     let settings = SyntheticSettings { garments, cell_m: 0.025, frames: 3, ..settings() };
-    folder::write_subject_folder(&settings, dir.path(), &|_| ()).unwrap();
-    let take = Subject::new(&settings).unwrap().take(1).unwrap();
+    let subject = Subject::new(&settings).unwrap();
+    folder::write_subject_folder(&subject, dir.path(), &|_| ()).unwrap();
+    let take = subject.take(1).unwrap();
     let mut source = import::open(&dir.path().join("01-shorts"), None).unwrap();
     assert_eq!(source.frame_count(), Some(3));
     for index in 0..3 {
@@ -183,7 +185,7 @@ fn folders_are_read_by_import() {
 }
 
 #[test]
-fn settings_out_of_range_are_told() {
+fn settings_out_of_range_are_refused_by_name() {
     let error = |settings: SyntheticSettings| Subject::new(&settings).unwrap_err();
     let message = error(SyntheticSettings { frames: 1, ..settings() }).to_string();
     assert!(message.contains("frames"), "{message}");
@@ -193,7 +195,7 @@ fn settings_out_of_range_are_told() {
 }
 
 #[test]
-fn what_is_seen_is_in_front() {
+fn only_surfaces_in_front_are_visible() {
     let take = SUBJECT.take(1).unwrap();
     let seen = truth::visible(&take);
     let share = seen.iter().filter(|s| **s).count() as f32 / seen.len() as f32;
@@ -203,4 +205,54 @@ fn what_is_seen_is_in_front() {
     let knee = take.joint_positions()[11].cast::<f32>();
     let near_knee = |t: &usize| surface.layer[*t] == 0 && (surface.mesh.corners(*t)[0] - knee).norm() < 0.09;
     assert!((0..seen.len()).filter(near_knee).all(|t| !seen[t]));
+}
+
+/// Numbers and names of a PLY header's elements, and how many bytes the header has.
+fn ply_header(bytes: &[u8]) -> (String, usize) {
+    let end = b"end_header\n";
+    let at = bytes.windows(end.len()).position(|w| w == end).expect("a PLY file") + end.len();
+    (String::from_utf8(bytes[..at].to_vec()).unwrap(), at)
+}
+
+#[test]
+fn the_truth_beside_a_recorded_subject_is_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let garments = vec![GarmentSettings::of(GarmentKind::Shorts)];
+    let settings = SyntheticSettings { garments, cell_m: 0.025, frames: 4, sway_degrees: 0.5, ..settings() };
+    let subject = Subject::new(&settings).unwrap();
+    let (folder, truth) = (dir.path().join("subject"), dir.path().join("subject/truth"));
+    record::record_subject(&subject, &folder, Some(&truth), &|_| ()).unwrap();
+    let take = subject.take(1).unwrap();
+    let read = |name: &str| std::fs::read(truth.join("01-shorts/truth").join(name)).unwrap();
+    // the surface: labels of every face, and the same vertices in take 0's pose
+    let bytes = read("surface.ply");
+    let (header, at) = ply_header(&bytes);
+    let (vertices, faces) = (take.surface.mesh.positions.len(), take.surface.mesh.triangles.len());
+    for line in [&format!("element vertex {vertices}")[..], "property float x0", "property uchar layer"] {
+        assert!(header.lines().any(|l| l == line), "{line}: {header}");
+    }
+    assert_eq!(bytes.len() - at, vertices * 27 + faces * 16);
+    let layers: Vec<u8> = (0..faces).map(|t| bytes[at + vertices * 27 + t * 16 + 13]).collect();
+    assert_eq!(layers, take.surface.layer);
+    // the garment alone has the same faces
+    let garment = read("garment_1.ply");
+    let shorts = layers.iter().filter(|l| **l == 1).count();
+    assert!(ply_header(&garment).0.contains(&format!("element face {shorts}\n")));
+    // poses of every frame at its device time, in the order of the frames
+    let poses = toile_capture::trajectory::parse(&String::from_utf8(read("poses.txt")).unwrap()).unwrap();
+    assert_eq!(poses.len(), 4);
+    for (index, pose) in poses.iter().enumerate() {
+        assert_eq!(pose.time_ns, take.moments[index].time_ns);
+        assert!((pose.pose.translation.vector - take.subject_from_camera(index).translation.vector).norm() < 1e-6);
+    }
+    let pose: serde_json::Value = serde_json::from_slice(&read("pose.json")).unwrap();
+    assert_eq!(pose["joints"].as_object().unwrap().len(), 52);
+    assert_eq!(pose["theta"]["rotations"].as_object().unwrap().len(), 52);
+    assert_eq!(String::from_utf8(read("sway.txt")).unwrap().lines().count(), 5);
+    let body = toile_geometry::ply::read(&truth.join("01-shorts/truth/body.ply")).unwrap();
+    assert_eq!(body.positions, take.body.positions);
+    let person: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(truth.join("subject.json")).unwrap()).unwrap();
+    assert_eq!(person["takes"], serde_json::json!(["00-body", "01-shorts"]));
+    assert!(person["girths"]["hip"]["girth_m"].as_f64().is_some() && person["beta"].as_array().unwrap().len() == 50);
 }

@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use toile_synthetic::{
-    GarmentKind, GarmentSettings, Pattern, Sex, Subject, SyntheticSettings, record::record_subject, truth,
-};
+use toile_synthetic::{GarmentKind, GarmentSettings, Pattern, Sex, Subject, SyntheticSettings, record::record_subject};
 
 /// The person and the garments of the shipped session.
 fn rowan() -> SyntheticSettings {
@@ -27,10 +25,7 @@ fn rowan() -> SyntheticSettings {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let folder = arguments.next().ok_or("usage: make_recorded FOLDER [TRUTH_FOLDER]")?;
-    let subject = Subject::new(&rowan())?;
-    record_subject(&subject, Path::new(&folder), &|_| ())?;
-    if let Some(truth_folder) = arguments.next() {
-        truth::write_subject(&subject, Path::new(&truth_folder))?;
-    }
+    let truth = arguments.next();
+    record_subject(&Subject::new(&rowan())?, Path::new(&folder), truth.as_ref().map(Path::new), &|_| ())?;
     Ok(())
 }

@@ -30,12 +30,12 @@ impl SyntheticDevice {
     /// Puts the subject of `settings` on the disk for take `take`.
     ///
     /// # Errors
-    /// [`SyntheticError`] where a setting is out of range or there is no such take.
+    /// [`SyntheticError`] where a setting is out of range or the subject has no such take.
     pub fn open(settings: &SyntheticSettings, take: usize) -> Result<Self, SyntheticError> {
         Ok(Self::before(Subject::new(settings)?.take(take)?))
     }
 
-    /// A device before a scene that is made already.
+    /// A device before a scene that has been made already.
     pub fn before(take: Take) -> Self {
         let rig = take.rig();
         Self { take, rig, next: 0, given: 0, dropped: BTreeSet::new(), unplugged_at: None }

@@ -30,7 +30,7 @@ fn unplugging_is_an_error_once_and_then_the_end() {
 }
 
 #[test]
-fn times_rise_and_wrong_takes_are_told() {
+fn times_rise_and_wrong_takes_are_refused() {
     let mut device = SyntheticDevice::open(&settings(), 0).unwrap();
     let mut last = 0;
     while let Some(frame) = device.next_frame().unwrap() {

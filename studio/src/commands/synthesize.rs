@@ -4,6 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use serde_json::json;
+use toile_capture::atomic_write;
+use toile_character::BodyModel;
+use toile_fitting::measure_table;
 use toile_pipeline::Observer;
 use toile_synthetic::{
     GarmentKind, GarmentSettings, SensorPreset, Sex, Subject, SyntheticError, SyntheticSettings,
@@ -14,7 +17,8 @@ use crate::{StudioError, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 A virtual person on a turning disk, seen by a virtual depth camera; everything follows from the seed.
-As a subject it has takes that `toile process` reads; as folders it has the images and the truth beside.
+As a subject it has takes that `toile process` reads, as folders the images that `toile import` reads. The truth is
+written beside: under OUT/truth for a subject, in each folder's truth/ otherwise (docs/synthetic.md says what it holds).
 
 Examples:
   toile synthesize --out olga --seed 7 --garments trousers,tshirt,jacket
@@ -27,7 +31,7 @@ pub struct Synthesize {
     /// Folder of the subject; its name is the subject's
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// subject: recordings for `toile process`; folders: images for `toile import`, with the truth
+    /// subject: recordings for `toile process`; folders: images for `toile import`
     #[arg(long = "as", value_enum, default_value_t = Kind::Subject)]
     kind: Kind,
     /// Everything random follows from it
@@ -91,19 +95,34 @@ impl Synthesize {
         let progress = &session.progress;
         progress.plan(1.0);
         progress.begin(&format!("{}: synthesize", settings.name), 1.0);
-        match self.kind {
-            Kind::Folders => write_subject_folder(&settings, &self.out, &|x| progress.at(x)).map_err(wrong)?,
-            Kind::Subject => {
-                let subject = Subject::new(&settings).map_err(wrong)?;
-                record_subject(&subject, &self.out, &|x| progress.at(x)).map_err(wrong)?;
+        let mut subject = Subject::new(&settings).map_err(wrong)?;
+        let measured = self.measured(&mut subject)?;
+        let truth = match self.kind {
+            Kind::Folders => {
+                write_subject_folder(&subject, &self.out, &|x| progress.at(x)).map_err(wrong)?;
+                self.out.clone()
             }
-        }
+            Kind::Subject => {
+                let truth = self.out.join("truth");
+                record_subject(&subject, &self.out, Some(&truth), &|x| progress.at(x)).map_err(wrong)?;
+                truth
+            }
+        };
+        atomic_write(&truth.join("measurements.json"), &measured).map_err(|e| failed(&self.out, e.into()))?;
         progress.end();
         let text = match self.kind {
-            Kind::Subject => format!("{0}: now `toile process {0}`\n", self.out.display()),
+            Kind::Subject => format!("{0}: now `toile process {0}`; the truth is in {0}/truth\n", self.out.display()),
             Kind::Folders => format!("{}: folders to import, with truth/ in each\n", self.out.display()),
         };
         Ok(Answer { text, results: json!({ "out": self.out, "settings": settings }), ..Answer::default() })
+    }
+
+    /// The true measurements, as in a processed subject's `measurements.json`; the true stature is entered into the subject.
+    fn measured(&self, subject: &mut Subject) -> Result<Vec<u8>, StudioError> {
+        let model = BodyModel::load_default().map_err(|e| StudioError::stage(&self.out, e))?;
+        let table = measure_table(&model, &subject.person.body).map_err(|e| StudioError::stage(&self.out, e))?;
+        subject.person.stature_m = table.value("stature").unwrap_or(subject.person.stature_m);
+        serde_json::to_vec_pretty(&table).map_err(|e| StudioError::stage(&self.out, e))
     }
 
     fn settings(&self) -> Result<SyntheticSettings, StudioError> {
