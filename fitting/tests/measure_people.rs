@@ -8,9 +8,9 @@ use toile_fitting::{FitSettings, fit_body, measure_extremes, measure_table, stat
 
 /// How many people are drawn from the body model.
 const PEOPLE: u64 = 48;
-/// The library's tapes and those by brute force: parts told apart by regions or by weights, levels 2 mm apart or at
-/// vertices, metres.
-const AGREE: f64 = 0.006;
+/// How far the library's tapes may be from those by brute force, metres and as a share: the rims of arms and legs differ,
+/// which are found by regions here and by weights there.
+const AGREE: (f64, f64) = (0.006, 0.01);
 
 /// A person about the mean of a sex, with a spread of 1.3 times the population's: thin, heavy, small and tall.
 fn drawn(model: &BodyModel, seed: u64) -> SkinnedMesh {
@@ -28,7 +28,10 @@ fn the_girths_of_many_people_are_those_that_brute_force_finds() {
         let table = measure_table(&model, &body).unwrap();
         for (name, truth) in tape::girths(&model, &body, &table) {
             let value = table.value(&name).unwrap_or_else(|| panic!("{name} of person {seed} is missing"));
-            assert!((value - truth).abs() < AGREE, "{name} of person {seed}: {value} m, by brute force {truth}");
+            assert!(
+                (value - truth).abs() < AGREE.0.max(AGREE.1 * truth),
+                "{name} of person {seed}: {value} m, by brute force {truth}"
+            );
         }
         let [hip, bust] = tape::prominence_given_up(&model, &body, &table);
         assert!(hip < 0.008 && bust < 0.006, "person {seed}: {hip} m of the buttocks, {bust} m of the bust given up");
