@@ -181,8 +181,11 @@ fn leg(brute: &BruteForce, side: &str) -> [(&'static str, f64); 5] {
 fn arm(brute: &BruteForce, side: &str) -> [(&'static str, f64); 2] {
     let keep = brute.arm(side);
     let at = |name: &str| brute.landmark(&format!("{side} {name}"));
-    let joint =
-        |name: &str| Joint::from_name(&format!("{side}{name}")).map(|j| brute.body.skeleton.position(j)).unwrap();
+    let joint = |name: &str| {
+        Joint::from_name(&format!("{side}{name}"))
+            .map(|j| brute.body.skeleton.position(j))
+            .expect("the joint has this name")
+    };
     let (upper, lower) = (joint("LowerArm") - joint("UpperArm"), joint("Hand") - joint("LowerArm"));
     let middle = nalgebra::center(&at("shoulder point"), &at("elbow point"));
     [
