@@ -211,7 +211,7 @@ fn only_surfaces_in_front_are_visible() {
 fn ply_header(bytes: &[u8]) -> (String, usize) {
     let end = b"end_header\n";
     let at = bytes.windows(end.len()).position(|w| w == end).expect("a PLY file") + end.len();
-    (String::from_utf8(bytes[..at].to_vec()).unwrap(), at)
+    (String::from_utf8_lossy(&bytes[..at]).into_owned(), at)
 }
 
 #[test]
