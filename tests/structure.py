@@ -27,7 +27,7 @@ DUPLICATE_LINES = 8
 # The tables of SIMD kernels (`dispatch`, `run`) in between do not count as hops.
 INNER_LOOPS = [
     ("fusion", "push", "update_row"),
-    ("fusion", "push", "residuals"),
+    ("fusion", "push", "accumulate"),
     ("fitting", "fit_body", "accumulate"),
     ("garments", "stack_layers", "solve_vertex"),
     ("stereo", "match_pair", "aggregate_row"),

@@ -16,17 +16,11 @@ use criterion::{
 use test_scene::{Memory, Scene, steps};
 use toile_capture::Frame;
 use toile_fusion::{
-    Fuser, FusionSettings,
-    depth_filter::drop_edges,
-    fuse,
-    integrate::integrate,
-    normals::surface_elements,
-    raycast::ray_cast,
-    surface::extract_surface,
+    Fuser, FusionSettings, fuse,
+    steps::{
+        CutDepth, Rectifier, Tsdf, View, drop_edges, extract_surface, integrate, ray_cast, surface_elements, track,
+    },
     survey,
-    track::track,
-    tsdf::Tsdf,
-    view::{CutDepth, Rectifier, View},
 };
 use toile_geometry::{Rigid, camera::PinholeCamera};
 

@@ -54,7 +54,7 @@ fn read_tum(path: &Path) -> Result<Vec<KnownPose>, Box<dyn Error>> {
     Ok(fs::read_to_string(path)?.lines().filter(|l| !l.starts_with('#')).filter_map(pose).collect())
 }
 
-/// Every so many frames of a source.
+/// Every `step`-th frame of a source.
 struct Every {
     source: Box<dyn Source>,
     step: u64,

@@ -1,6 +1,6 @@
 //! What can go wrong while fusing.
 
-/// Errors of the fusion crate: there is no scan. A poor scan is not an error but a warning in the report.
+/// Why there is no scan. A poor scan is not an error but a warning in the report.
 #[derive(Debug, thiserror::Error)]
 pub enum FusionError {
     /// The source failed.

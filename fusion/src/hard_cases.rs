@@ -7,12 +7,11 @@ use toile_capture::{DepthImage, Frame};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use crate::{
-    Fuser, FusionError, FusionSettings, KnownPose, Outcome, Prior, Volume, fuse,
-    integrate::integrate,
-    surface::extract_surface,
+    DropReason, Fuser, FusionError, FusionSettings, KnownPose, Outcome, Prior, Volume,
+    field::{Tsdf, extract_surface, integrate},
+    frame::View,
+    fuse,
     test_scene::{Memory, Scene, figure_distance, steps},
-    tsdf::Tsdf,
-    view::View,
 };
 
 fn settings() -> FusionSettings {
@@ -76,7 +75,7 @@ fn a_hand_held_camera_that_was_lost_for_long_is_found_at_a_place_it_has_seen() {
     frames.push(Frame { index: 15, device_time_ns: 3_000_000_000, ..frames[4].clone() });
     let told: Vec<bool> = frames.iter().map(|f| matches!(fuser.push(f).unwrap(), Outcome::Fused { .. })).collect();
     assert_eq!(told, [vec![true; 10], vec![false; 5], vec![true]].concat());
-    let off = fuser.kept[10].scan_from_camera.inverse() * fuser.kept[4].scan_from_camera;
+    let off = fuser.kept.frames[10].model_from_camera.inverse() * fuser.kept.frames[4].model_from_camera;
     assert!(off.translation.vector.norm() < 0.01 && off.rotation.angle() < 0.01, "{off}");
 }
 
@@ -93,7 +92,7 @@ fn a_take_does_not_begin_with_a_frame_without_surface() {
     }));
     let scan = fuse(&mut Memory { rig: scene.rig(), frames, next: 0 }, &whole, &|_| {}).unwrap();
     assert_eq!(scan.report.dropped.iter().map(|d| d.index).collect::<Vec<_>>(), [0, 1]);
-    assert!(scan.report.dropped[0].reason.contains("too little surface"), "{:?}", scan.report.dropped);
+    assert_eq!(scan.report.dropped[0].reason, DropReason::TooLittleSurface);
     // And one that has no other frames says so.
     let frames = (0..4).map(speckles).collect();
     let error = fuse(&mut Memory { rig: scene.rig(), frames, next: 0 }, &whole, &|_| {}).unwrap_err();

@@ -2,44 +2,29 @@
 //!
 //! The way of a take:
 //!
-//! 1. [`depth_filter`] drops depth edges; [`volume`] and [`floor`] find the subject and cut everything else away;
-//! 2. [`track`] registers each frame to the model so far ([`tsdf`], [`raycast`]) from a pose that [`motion`]
-//!    predicts, with colours where the shape leaves a direction open; trusted frames are fused ([`integrate`]); a lost
-//!    subject is searched for about the axis and must be confirmed by the next frame;
-//! 3. [`closing`] optimises all poses together over overlapping frame pairs, so that the turn closes;
-//! 4. the frames are fused again and registered to the whole model;
-//! 5. [`surface`] extracts the mesh, [`clean_up`] makes it one closed, smooth, light surface.
+//! 1. `frame` drops depth edges and gives each pixel its normal; `subject` finds the person and cuts everything else away;
+//! 2. `tracking` registers each frame to the model so far from a pose that the motion predicts, with colours where the
+//!    shape leaves a direction open; trusted frames are fused into the `field`; a lost subject is searched for about the
+//!    axis and must be confirmed by the next frame;
+//! 3. `finish` optimises all poses together over overlapping frame pairs, so that the turn closes, fuses the frames again,
+//!    registers them to the whole model, and makes the extracted mesh one closed, smooth, light surface.
 //!
-//! [`fuse`] runs all of it over a source; [`Fuser`] takes frames one by one; [`LiveFuser`] only follows, in little memory.
+//! [`fuse`] runs all of it over a source; [`Fuser`] takes frames one by one, and [`finish`] makes their scan;
+//! [`LiveFuser`] only follows, in little memory. Frames: `model_from_camera` while a take runs (the model's frame is
+//! level, its origin on the turntable's axis, where a subject was found), `scan_from_camera` in the finished scan.
 
-mod band;
-pub mod clean_up;
-pub mod closing;
-mod cube_table;
-pub mod depth_filter;
-pub mod error;
+mod drop_reason;
+mod error;
+mod field;
 mod finish;
-pub mod floor;
-pub mod fuser;
-pub mod integrate;
-mod layers;
-pub mod live;
-pub mod motion;
-pub mod noise;
-pub mod normals;
-mod photometric;
-mod projection;
-pub mod raycast;
-mod relocalise;
-pub mod report;
-pub mod scan;
-pub mod settings;
-pub mod surface;
-pub mod take;
-pub mod track;
-pub mod tsdf;
-pub mod view;
-pub mod volume;
+mod frame;
+mod report;
+mod scan;
+mod settings;
+mod subject;
+mod take;
+mod timings;
+mod tracking;
 
 #[cfg(test)]
 mod hard_cases;
@@ -48,13 +33,20 @@ mod test_scene;
 #[cfg(test)]
 mod tests;
 
-pub use toile_geometry::element;
-use toile_geometry::lanes::floats as lanes;
-
+pub use drop_reason::DropReason;
 pub use error::FusionError;
-pub use fuser::{Fuser, Outcome};
-pub use live::LiveFuser;
-pub use report::{FusionReport, Timings};
+pub use finish::finish;
+pub use report::{DroppedFrame, FusionReport, VolumeReport};
 pub use scan::{Scan, TrackedFrame};
 pub use settings::{FusionSettings, KnownPose, Prior, Volume};
-pub use take::{fuse, survey};
+pub use subject::SubjectVolume;
+pub use take::{Fuser, LiveFuser, Outcome, fuse, survey};
+pub use timings::{StepTiming, Timings};
+pub use tracking::Tracked;
+
+/// The steps of a frame one by one, for benchmarks and experiments.
+pub mod steps {
+    pub use crate::field::{Tsdf, extract_surface, integrate, ray_cast};
+    pub use crate::frame::{CutDepth, Rectifier, View, drop_edges, surface_elements};
+    pub use crate::tracking::track;
+}

@@ -4,10 +4,7 @@ use std::fmt::Write;
 
 use toile_geometry::{Mesh, Rigid};
 
-use crate::{
-    report::{FusionReport, Timings},
-    track::Tracked,
-};
+use crate::{report::FusionReport, timings::Timings, tracking::Tracked};
 
 /// A frame of the scan.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,6 +3,11 @@
 use serde::{Deserialize, Serialize};
 use toile_geometry::Rigid;
 
+use crate::FusionError;
+
+/// A known pose belongs to a frame whose device time is at most this far from its own, nanoseconds.
+pub(crate) const KNOWN_POSE_WITHIN_NS: i64 = 5_000_000;
+
 /// What of the frames is fused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -81,5 +86,21 @@ impl Default for FusionSettings {
             fill_holes: true,
             smoothing_passes: 5,
         }
+    }
+}
+
+impl FusionSettings {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// [`FusionError::Settings`] names the first setting that is out of its range.
+    pub(crate) fn check(&self) -> Result<(), FusionError> {
+        if !(self.voxel_size > 1e-4 && self.voxel_size < 0.2) {
+            return Err(FusionError::Settings("voxel_size must be between 0.1 mm and 0.2 m".into()));
+        }
+        if !(self.truncation >= 2.0 * self.voxel_size && self.truncation < 1.0) {
+            return Err(FusionError::Settings("truncation must be at least two voxels and less than 1 m".into()));
+        }
+        Ok(())
     }
 }

@@ -272,7 +272,7 @@ fn fuse(mut fuser: LiveFuser, kept: Vec<Frame>, sensors: &mut Sensors<'_>) -> Ve
         let outcome = fuser.push(&frame);
         let mut state = shared.lock();
         match outcome {
-            Ok(Outcome::Fused { scan_from_camera, .. }) => {
+            Ok(Outcome::Fused { model_from_camera: scan_from_camera, .. }) => {
                 lost = 0;
                 pose = Some(scan_from_camera);
                 state.seen.fused += 1;

@@ -1,0 +1,77 @@
+//! Better poses once the whole take is known: the turn is closed, and every frame is registered to the whole.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use rayon::prelude::*;
+use toile_geometry::Rigid;
+
+use super::{closing::close, fuse_again::fuse_again};
+use crate::{
+    FusionError,
+    frame::View,
+    report::FusionReport,
+    take::Fuser,
+    tracking::{DEGENERATE, Kept, register, samples},
+};
+
+/// Frames in the joint optimisation at most; of more, evenly spaced ones.
+const MOST_CLOSED: usize = 100;
+/// Frames in a round of refinement at most.
+const MOST_REFINED: usize = 200;
+/// Points of a frame that is registered to the whole.
+const POINTS: usize = 6000;
+
+/// Joint optimisation over key frames; frames between follow their neighbours.
+pub(crate) fn close_turn(fuser: &mut Fuser, report: &mut FusionReport) {
+    let rounds = fuser.settings.closing_rounds;
+    if rounds == 0 {
+        return;
+    }
+    let keys = fuser.kept.key_frames(MOST_CLOSED);
+    let (kept, window) = (&fuser.kept, fuser.model.window);
+    let views: Vec<View> = keys.par_iter().map(|&i| kept.frames[i].depth.view(window)).collect();
+    let mut poses: Vec<Rigid> = keys.iter().map(|&i| kept.frames[i].model_from_camera).collect();
+    let closing = fuser.clock.time("close", || close(&views, &mut poses, rounds));
+    report.closing_pairs = closing.pairs;
+    report.seam_pairs = closing.seam_pairs;
+    report.seam_before_mm = closing.seam_before * 1e3;
+    report.seam_after_mm = closing.seam_after * 1e3;
+    follow(&mut fuser.kept, &keys, &poses);
+}
+
+/// Fuses key frames and registers each of them to the whole.
+///
+/// # Errors
+/// [`FusionError::TooLarge`] where the field outgrows its index.
+pub(crate) fn refine(fuser: &mut Fuser) -> Result<(), FusionError> {
+    let keys = fuser.kept.key_frames(MOST_REFINED);
+    let field = fuse_again(fuser, &keys, false)?;
+    let (kept, window) = (&fuser.kept, fuser.model.window);
+    let registered = |&i: &usize| {
+        let (view, before) = (kept.frames[i].depth.view(window), kept.frames[i].model_from_camera);
+        let tracked = register(&field, &samples(&view, POINTS), &before);
+        if tracked.overlap > 0.5 && tracked.conditioning > DEGENERATE { tracked.model_from_camera } else { before }
+    };
+    let poses: Vec<Rigid> = fuser.clock.time("refine", || keys.par_iter().map(registered).collect());
+    let back = kept.frames[0].model_from_camera * poses[0].inverse();
+    follow(&mut fuser.kept, &keys, &poses.iter().map(|pose| back * pose).collect::<Vec<_>>());
+    Ok(())
+}
+
+/// Gives the key frames new poses; the frames between follow their neighbours smoothly.
+fn follow(kept: &mut Kept, keys: &[usize], poses: &[Rigid]) {
+    let step = keys.get(1).map_or(1, |second| second - keys[0]);
+    let corrections: Vec<Rigid> =
+        keys.iter().zip(poses).map(|(&i, pose)| pose * kept.frames[i].model_from_camera.inverse()).collect();
+    for (i, frame) in kept.frames.iter_mut().enumerate() {
+        let (k, share) = (i / step, (i % step) as f64 / step as f64);
+        let next = corrections.get(k + 1).unwrap_or(&corrections[k]);
+        frame.model_from_camera = between(&corrections[k], next, share) * frame.model_from_camera;
+    }
+}
+
+/// The motion a share of the way from one to another.
+fn between(a: &Rigid, b: &Rigid, share: f64) -> Rigid {
+    let step = (a.rotation.inverse() * b.rotation).scaled_axis() * share;
+    let rotation = a.rotation * UnitQuaternion::from_scaled_axis(step);
+    Isometry3::from_parts(Translation3::from(a.translation.vector.lerp(&b.translation.vector, share)), rotation)
+}

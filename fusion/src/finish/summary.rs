@@ -1,0 +1,91 @@
+//! What the report and the timings say in the end.
+
+use toile_geometry::lanes::instruction_set;
+
+use crate::{
+    drop_reason::DropReason,
+    field::VOXELS,
+    report::{FusionReport, VolumeReport},
+    settings::KNOWN_POSE_WITHIN_NS,
+    take::Fuser,
+    timings::Timings,
+};
+
+/// A seam wider than this means that the subject moved, millimetres.
+const OPEN_SEAM_MM: f64 = 5.0;
+
+/// What the report says about the final field.
+pub(crate) struct FieldSize {
+    pub blocks: usize,
+    pub bytes: usize,
+    pub truncation: f32,
+}
+
+/// Fills in what the report says about frames, volume and noise, with its warnings; the timings.
+pub(crate) fn summarise(fuser: &mut Fuser, field: &FieldSize, report: &mut FusionReport) -> Timings {
+    report.frames_seen = fuser.log.seen;
+    report.frames_fused = fuser.kept.len();
+    report.dropped = std::mem::take(&mut fuser.log.dropped);
+    report.sensors_not_used = std::mem::take(&mut fuser.log.sensors_not_used);
+    report.volume = fuser.volume.as_ref().map(|v| VolumeReport {
+        radius_m: v.radius,
+        floor_found: v.floor.is_some(),
+        bottom_m: v.bottom.unwrap_or(0.0),
+        axis_distance_m: v.model_from_camera.translation.vector.xz().norm(),
+    });
+    report.noise_mm = fuser.model.noise * 1e3;
+    report.truncation_mm = f64::from(field.truncation) * 1e3;
+    summarise_tracking(fuser, report);
+    report.warnings = warnings(report);
+    timings(fuser, field)
+}
+
+fn summarise_tracking(fuser: &Fuser, report: &mut FusionReport) {
+    let tracked = || fuser.kept.frames.iter().filter_map(|k| k.tracked);
+    let mut residuals: Vec<f64> = tracked().map(|t| t.residual * 1e3).collect();
+    residuals.sort_unstable_by(f64::total_cmp);
+    report.residual_mm = residuals.get(residuals.len() / 2).copied().unwrap_or(0.0);
+    report.residual_max_mm = residuals.last().copied().unwrap_or(0.0);
+    report.conditioning_least = tracked().map(|t| t.conditioning).min_by(f64::total_cmp).unwrap_or(0.0);
+    report.frames_by_color = tracked().filter(|t| t.by_color).count();
+}
+
+fn timings(fuser: &Fuser, field: &FieldSize) -> Timings {
+    let (frames, touched) = (fuser.kept.len().max(1), fuser.model.touched);
+    Timings {
+        blocks: field.blocks,
+        voxels: field.blocks * VOXELS,
+        voxels_touched_per_frame: touched.voxels / frames,
+        voxels_updated_per_frame: touched.updated / frames,
+        simd: instruction_set().into(),
+        field_bytes: field.bytes,
+        ..fuser.clock.timings()
+    }
+}
+
+fn warnings(report: &FusionReport) -> Vec<String> {
+    let mut list = Vec::new();
+    if !report.sensors_not_used.is_empty() {
+        let names = report.sensors_not_used.join("`, `");
+        list.push(format!("the scan is made from the rig's first sensor alone: the depth of `{names}` is not used"));
+    }
+    if report.volume.is_some() && !report.full_turn && report.turned_deg > 0.0 {
+        list.push(format!("no full turn: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));
+    }
+    let unknown = report.dropped.iter().filter(|d| d.reason == DropReason::NoKnownPose).count();
+    if unknown > 0 {
+        let within = KNOWN_POSE_WITHIN_NS / 1_000_000;
+        list.push(format!(
+            "{unknown} of {} frames have no known pose within {within} ms and are left out",
+            report.frames_seen
+        ));
+    }
+    let lost = report.frames_seen.saturating_sub(report.frames_fused + unknown);
+    if lost * 20 > report.frames_seen {
+        list.push(format!("{lost} of {} frames could not be used", report.frames_seen));
+    }
+    if report.seam_after_mm > OPEN_SEAM_MM {
+        list.push(format!("the turn closes only to {:.1} mm: the subject moved", report.seam_after_mm));
+    }
+    list
+}

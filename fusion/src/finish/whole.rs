@@ -1,0 +1,106 @@
+//! The end of a take: the turn is closed, everything is fused again, the surface becomes the scan.
+
+use toile_geometry::Mesh;
+
+use super::{
+    clean_up::clean_up,
+    fuse_again::final_field,
+    placing::place,
+    poses::{close_turn, refine},
+    summary::{FieldSize, summarise},
+};
+use crate::{
+    FusionError, Prior, Scan, TrackedFrame,
+    field::{Tsdf, crossings, tidy},
+    report::FusionReport,
+    settings::FusionSettings,
+    take::Fuser,
+};
+
+/// Weight units that make a voxel surface: two frames at the most grazing angle.
+const LEAST_WEIGHT: u16 = 2;
+/// The same for each frame of a subject that turns before a resting camera, which sees every place in a fixed share of the
+/// frames: one frame in fifty at the most grazing angle. Flying pixels and the noise over the disk come with every frame,
+/// so the weight that makes a surface must grow with the number of frames.
+const LEAST_WEIGHT_A_FRAME: f64 = 0.02;
+
+/// Closes the turn, fuses everything again and makes the scan.
+///
+/// # Errors
+/// [`FusionError::NotTracked`] where fewer than three frames were fused, and [`FusionError::NobodyInIt`] where they make no
+/// surface.
+pub fn finish(mut fuser: Fuser, progress: &(dyn Fn(f32) + Sync)) -> Result<Scan, FusionError> {
+    check_enough_frames(&fuser)?;
+    let mut report = FusionReport { settings: fuser.settings.clone(), ..FusionReport::default() };
+    report.settings.poses = None;
+    if fuser.settings.poses.is_none() {
+        close_turn(&mut fuser, &mut report);
+        progress(0.3);
+        for round in 0..fuser.settings.refine_rounds {
+            refine(&mut fuser)?;
+            progress(0.3 + 0.2 * (round + 1) as f32 / fuser.settings.refine_rounds as f32);
+        }
+    }
+    let field = final_field(&mut fuser)?;
+    progress(0.7);
+    let size = FieldSize { blocks: field.block_count(), bytes: field.bytes(), truncation: field.truncation() };
+    let raw = extract(&mut fuser, field)?;
+    report.triangles_raw = raw.triangles.len();
+    let scan_from_model = place(&fuser, &raw, &mut report);
+    let mesh = raw.transformed(&scan_from_model);
+    drop(raw);
+    let mesh = clean(&mut fuser, mesh, &mut report);
+    progress(1.0);
+    let timings = summarise(&mut fuser, &size, &mut report);
+    let trajectory = fuser.kept.frames.into_iter().map(|k| TrackedFrame {
+        index: k.index,
+        device_time_ns: k.device_time_ns,
+        scan_from_camera: scan_from_model * k.model_from_camera,
+        tracked: k.tracked,
+    });
+    Ok(Scan { mesh, trajectory: trajectory.collect(), report, timings })
+}
+
+fn check_enough_frames(fuser: &Fuser) -> Result<(), FusionError> {
+    let least = if fuser.log.seen < 3 { 1 } else { 3 };
+    if fuser.kept.len() >= least {
+        return Ok(());
+    }
+    let reason = fuser.log.dropped.first().map_or_else(|| "too few frames".into(), |d| d.reason.to_string());
+    Err(FusionError::NotTracked { reason, tracked: fuser.kept.len(), frames: fuser.log.seen })
+}
+
+/// The raw surface, model frame.
+fn extract(fuser: &mut Fuser, field: Tsdf) -> Result<Mesh, FusionError> {
+    let turning = fuser.volume.is_some();
+    let least_weight = least_weight(&fuser.settings, turning, fuser.kept.len());
+    let raw = fuser.clock.time("extract", || {
+        let crossings = crossings(&field, least_weight);
+        drop(field);
+        tidy(&crossings)
+    });
+    if raw.triangles.is_empty() {
+        return Err(FusionError::NobodyInIt { reason: "the fused frames make no surface".into() });
+    }
+    Ok(raw)
+}
+
+/// Weight units that make a voxel surface. A hand-held camera sees a place in a few of its frames only.
+pub(crate) fn least_weight(settings: &FusionSettings, is_cut_out: bool, frames: usize) -> u16 {
+    let turning = is_cut_out && settings.prior == Prior::Turntable;
+    let share = if turning { (LEAST_WEIGHT_A_FRAME * frames as f64) as u16 } else { 0 };
+    share.max(LEAST_WEIGHT)
+}
+
+fn clean(fuser: &mut Fuser, mesh: Mesh, report: &mut FusionReport) -> Mesh {
+    // Known poses keep their own frame, whose zero is not the floor.
+    let settings = &fuser.settings;
+    let on_floor = fuser.volume.as_ref().filter(|v| v.floor.is_some() && settings.poses.is_none());
+    let cut = on_floor.and_then(|v| v.bottom).map(|bottom| bottom as f32);
+    let (mesh, cleaned) = fuser.clock.time("clean up", || clean_up(mesh, settings, cut));
+    report.triangles = mesh.triangles.len();
+    report.holes_filled = cleaned.holes;
+    report.filled_percent = cleaned.filled_percent;
+    report.watertight = cleaned.watertight;
+    mesh
+}

@@ -1,0 +1,10 @@
+//! Where the subject is: what moves before what rests.
+
+mod background;
+mod cut;
+mod floor;
+mod volume;
+
+pub(crate) use volume::{SURVEY_FRAMES, find_volume};
+
+pub use cut::SubjectVolume;

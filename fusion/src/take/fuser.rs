@@ -1,0 +1,137 @@
+//! The stage as an object: frames in one by one, each tracked against the model so far and fused into it.
+
+use toile_capture::{Frame, Rig, Sensor};
+use toile_geometry::{Mesh, Rigid};
+
+use super::{
+    model::Model,
+    preparer::{LEAST_PIXELS, Preparer, first_sensor},
+};
+use crate::{
+    FusionError, FusionSettings,
+    drop_reason::DropReason,
+    field::extract_surface,
+    frame::{CutDepth, View},
+    report::DroppedFrame,
+    subject::SubjectVolume,
+    timings::Stopwatch,
+    tracking::{Kept, KeptFrame, Past, Tracked, Tracker},
+};
+
+/// What became of a pushed frame.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// It is in the model.
+    Fused {
+        /// Its pose in the model's frame: the camera's at the first frame as the volume has it.
+        model_from_camera: Rigid,
+        /// How well it fitted; `None` for the first frame and known poses.
+        tracked: Option<Tracked>,
+    },
+    /// It is left out.
+    Dropped {
+        /// Why.
+        reason: DropReason,
+    },
+}
+
+/// What happened to the frames that are not in the model.
+#[derive(Debug, Default)]
+pub(crate) struct Log {
+    /// Frames that were pushed or could not be read.
+    pub seen: usize,
+    pub dropped: Vec<DroppedFrame>,
+    /// Names of sensors whose depth is not fused.
+    pub sensors_not_used: Vec<String>,
+}
+
+/// The stage as an object that takes frames one by one. It never waits for anything, nor looks ahead: a frame's pose
+/// and the model with it are there when [`Fuser::push`] returns.
+pub struct Fuser {
+    pub(crate) settings: FusionSettings,
+    pub(crate) sensor: Sensor,
+    pub(crate) volume: Option<SubjectVolume>,
+    preparer: Preparer,
+    tracker: Tracker,
+    pub(crate) model: Model,
+    pub(crate) kept: Kept,
+    pub(crate) log: Log,
+    pub(crate) clock: Stopwatch,
+}
+
+impl Fuser {
+    /// A fuser for the first sensor of a rig. `volume` as [`crate::survey`] finds it, or `None` for everything.
+    ///
+    /// # Errors
+    /// Settings out of range, or a calibration that cannot be used.
+    pub fn new(rig: &Rig, volume: Option<SubjectVolume>, settings: FusionSettings) -> Result<Self, FusionError> {
+        let sensor = first_sensor(rig)?.clone();
+        settings.check()?;
+        let first = volume.as_ref().map_or_else(Rigid::identity, |v| v.model_from_camera);
+        Ok(Self {
+            preparer: Preparer::new(&sensor, &settings, volume.clone()),
+            tracker: Tracker::new(&settings, &sensor, first),
+            model: Model::new(&settings),
+            kept: Kept::default(),
+            log: Log::default(),
+            clock: Stopwatch::new(),
+            settings,
+            sensor,
+            volume,
+        })
+    }
+
+    /// Tracks one frame and, where its pose can be trusted, fuses it.
+    ///
+    /// # Errors
+    /// [`FusionError::TooLarge`] where the model outgrows its index.
+    pub fn push(&mut self, frame: &Frame) -> Result<Outcome, FusionError> {
+        self.log.seen += 1;
+        let prepared = self.prepare(frame);
+        let past = Past { field: &self.model.field, kept: &self.kept };
+        let located = prepared.and_then(|(depth, view)| {
+            let located = self.tracker.locate(frame, &view, past, &mut self.clock)?;
+            Ok((depth, view, located))
+        });
+        let (depth, view, located) = match located {
+            Ok(located) => located,
+            Err(reason) => return Ok(self.drop_frame(frame, reason)),
+        };
+        self.model.integrate(&view, &located.model_from_camera, &mut self.clock)?;
+        self.tracker.follow(frame, located.model_from_camera);
+        self.kept.frames.push(KeptFrame::new(frame, depth, &located));
+        Ok(Outcome::Fused { model_from_camera: located.model_from_camera, tracked: located.tracked })
+    }
+
+    /// Frames in a row without a trusted pose; 0 while the subject is followed.
+    pub fn lost_frames(&self) -> usize {
+        self.tracker.lost_frames()
+    }
+
+    /// The model so far, in the frame of the first poses; for a preview.
+    pub fn preview(&self) -> Mesh {
+        extract_surface(&self.model.field, 1)
+    }
+
+    /// The subject's depth in a frame and its surface elements.
+    fn prepare(&mut self, frame: &Frame) -> Result<(CutDepth, View), DropReason> {
+        let depth = self.preparer.prepare(frame, &mut self.clock)?;
+        let is_first = self.kept.is_empty();
+        if is_first {
+            self.model.adapt(&depth);
+        }
+        let window = self.model.window;
+        let view = self.clock.time("normals", || depth.view(window));
+        if is_first && view.count() < LEAST_PIXELS {
+            return Err(DropReason::TooLittleSurface);
+        }
+        Ok((depth, view))
+    }
+
+    fn drop_frame(&mut self, frame: &Frame, reason: DropReason) -> Outcome {
+        tracing::debug!(frame = frame.index, %reason, "frame dropped");
+        let dropped = DroppedFrame { index: frame.index, device_time_ns: frame.device_time_ns, reason: reason.clone() };
+        self.log.dropped.push(dropped);
+        Outcome::Dropped { reason }
+    }
+}

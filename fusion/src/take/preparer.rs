@@ -1,0 +1,83 @@
+//! From a frame to the depth of the subject that is fused.
+
+use toile_capture::{Frame, Rig, Sensor};
+
+use crate::{
+    FusionError,
+    drop_reason::DropReason,
+    frame::{CutDepth, Rectifier, drop_edges},
+    settings::FusionSettings,
+    subject::SubjectVolume,
+    timings::Stopwatch,
+};
+
+/// A depth image has at most this many pixels: their numbers, with the border that a view adds, must be exact as floats.
+const MOST_PIXELS: u64 = 16_000_000;
+/// A frame that is used has at least this many measured pixels.
+pub(crate) const LEAST_PIXELS: usize = 500;
+
+/// Filters the depth of one sensor and cuts the subject out.
+pub(crate) struct Preparer {
+    depth_scale: f32,
+    filter: Filter,
+    volume: Option<SubjectVolume>,
+}
+
+/// Rectification and the depth-edge filter.
+pub(crate) struct Filter {
+    pub rectifier: Rectifier,
+    jump_slope: f64,
+}
+
+impl Filter {
+    pub(crate) fn new(sensor: &Sensor, settings: &FusionSettings) -> Self {
+        Self { rectifier: Rectifier::new(sensor, settings.max_depth), jump_slope: settings.jump_slope }
+    }
+
+    /// Rectified depth in metres without edges; `None` without depth or with an image of another size.
+    pub(crate) fn apply(&self, frame: &Frame) -> Option<Vec<f32>> {
+        let camera = &self.rectifier.camera;
+        let image = frame.depth.as_ref().filter(|i| (i.width, i.height) == (camera.width, camera.height))?;
+        Some(drop_edges(camera, &self.rectifier.rectify(image), self.jump_slope))
+    }
+}
+
+impl Preparer {
+    pub(crate) fn new(sensor: &Sensor, settings: &FusionSettings, volume: Option<SubjectVolume>) -> Self {
+        Self { depth_scale: sensor.depth_scale as f32, filter: Filter::new(sensor, settings), volume }
+    }
+
+    /// The depth of the subject in a frame.
+    ///
+    /// # Errors
+    /// Why the frame cannot be used.
+    pub(crate) fn prepare(&self, frame: &Frame, clock: &mut Stopwatch) -> Result<CutDepth, DropReason> {
+        let camera = &self.filter.rectifier.camera;
+        let depth = clock.time("filter", || self.filter.apply(frame)).ok_or(DropReason::NoDepth)?;
+        let cut = clock.time("cut", || match &self.volume {
+            Some(volume) => CutDepth::new(camera, &volume.cut(camera, &depth), self.depth_scale),
+            None => CutDepth::new(camera, &depth, self.depth_scale),
+        });
+        let pixels = cut.count();
+        if pixels < LEAST_PIXELS {
+            return Err(DropReason::TooFewPixels { pixels });
+        }
+        Ok(cut)
+    }
+}
+
+/// The sensor of a rig that is fused.
+///
+/// # Errors
+/// [`FusionError::Calibration`] where there is none, or its calibration cannot be used.
+pub(crate) fn first_sensor(rig: &Rig) -> Result<&Sensor, FusionError> {
+    let wrong = |reason: &str| FusionError::Calibration { sensor: 0, reason: reason.into() };
+    let sensor = rig.sensors.first().ok_or_else(|| wrong("the source names no sensor"))?;
+    if !sensor.depth.is_valid() || sensor.depth_scale.is_nan() || sensor.depth_scale <= 0.0 {
+        return Err(wrong("image size, focal length or depth scale is not positive"));
+    }
+    if u64::from(sensor.depth.width) * u64::from(sensor.depth.height) > MOST_PIXELS {
+        return Err(wrong("its depth image has more than 16 million pixels; record at a smaller size"));
+    }
+    Ok(sensor)
+}

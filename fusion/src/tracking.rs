@@ -1,0 +1,29 @@
+//! Where each frame is: registration to the model, the motion so far, and finding a lost subject again.
+
+mod approach;
+mod axis;
+mod color;
+mod equations;
+mod grey;
+mod kept;
+mod motion;
+mod open_directions;
+mod pictures;
+mod registration;
+mod relocalise;
+mod samples;
+mod starts;
+mod tracked;
+mod tracker;
+mod trust;
+
+pub(crate) use axis::{Axis, find_axis, total_turn};
+pub(crate) use equations::{NormalEquations, increment};
+pub(crate) use kept::{Kept, KeptFrame, Past};
+pub(crate) use open_directions::{DEGENERATE, hold_open_directions};
+pub(crate) use registration::register;
+pub(crate) use samples::{Sample, samples};
+pub(crate) use tracker::Tracker;
+
+pub use approach::track;
+pub use tracked::Tracked;
