@@ -23,4 +23,16 @@ pub enum GarmentError {
          trousers, skirt, dress or jacket) in subject.toml, or set labelling = \"graph-cut\""
     )]
     NoTemplate(GarmentType),
+    /// A number of the settings is outside of its range.
+    #[error("{name} = {value} is outside of its range, {least} to {most}")]
+    Settings {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: f32,
+        /// The smallest value that is accepted.
+        least: f32,
+        /// The largest value that is accepted.
+        most: f32,
+    },
 }

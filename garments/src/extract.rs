@@ -41,13 +41,14 @@ pub struct Extraction {
 ///
 /// # Errors
 /// [`GarmentError`] where a mesh is empty, broken, or does not go with its weights; where edits cannot be used; and where
-/// the settings ask for a template that the garment's type does not have. A take without a new garment is a result with
+/// a setting is outside of its range or asks for a template that the garment's type does not have. A take without a new garment is a result with
 /// [`Warning::NothingNew`] and empty meshes.
 pub fn extract(
     take: &Take,
     settings: &ExtractSettings,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Extraction, GarmentError> {
+    settings.check()?;
     take.check()?;
     let on = Measured::new(take, settings);
     progress(0.3);

@@ -1,6 +1,10 @@
 //! Settings of the stage; each default serves any subject.
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
+
+use crate::error::GarmentError;
 
 /// How the vertices of a scan are labelled as new garment or not.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,6 +81,30 @@ impl Default for ExtractSettings {
     }
 }
 
+impl ExtractSettings {
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// [`GarmentError::Settings`] names the first number that is outside, with its range.
+    pub fn check(&self) -> Result<(), GarmentError> {
+        check_ranges(&[
+            ("smoothness", self.smoothness, 0.0..=0.1),
+            ("reach", self.reach, 0.05..=1.0),
+            ("color_search", self.color_search, 0.0..=0.05),
+            ("rounds", self.rounds as f32, 1.0..=10.0),
+            ("hem_smoothing", self.hem_smoothing, 0.0..=0.05),
+            ("edge_loss", self.edge_loss, 0.0..=0.03),
+            ("rim_smoothing", self.rim_smoothing, 0.0..=0.05),
+            ("hem_depth", self.hem_depth, 0.0..=0.1),
+            ("least_area", self.least_area, 0.0..=0.1),
+            ("piece_share", self.piece_share, 0.0..=1.0),
+            ("hole_rim", self.hole_rim, 0.0..=1.0),
+            ("loose_distance", self.loose_distance, 0.001..=0.2),
+        ])?;
+        if self.edge_length == 0.0 { Ok(()) } else { check_ranges(&[("edge_length", self.edge_length, 0.002..=0.05)]) }
+    }
+}
+
 /// How layers that cut through one another are parted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -116,6 +144,20 @@ impl Default for StackSettings {
 }
 
 impl StackSettings {
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// [`GarmentError::Settings`] names the first number that is outside, with its range.
+    pub fn check(&self) -> Result<(), GarmentError> {
+        check_ranges(&[
+            ("gap", self.gap, 0.0..=0.02),
+            ("spread", self.spread, 0.002..=0.1),
+            ("rounds", self.rounds as f32, 0.0..=1000.0),
+            ("reach", self.reach, 0.01..=0.2),
+            ("push_beyond", self.push_beyond, 0.0..=0.02),
+        ])
+    }
+
     /// The gap of a layer of cloth `thickness` metres thick over what lies below. Meshes are the outer sides of cloth,
     /// so its own thickness has to fit in between.
     pub fn gap_of(&self, thickness: f32) -> f32 {
@@ -127,7 +169,7 @@ impl StackSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CullSettings {
-    /// What lies nearer to skin or cloth in sight is kept, metres along the surface, 0 to 0.5: so far a hem may move.
+    /// What lies nearer to skin or cloth in sight is kept, metres along the surface, 0 to 1: so far a hem may move.
     /// Default 0.03.
     pub margin: f32,
     /// Cloth this far off still hides, metres, 0.01 to 1. Default 0.1.
@@ -138,6 +180,23 @@ impl Default for CullSettings {
     fn default() -> Self {
         Self { margin: 0.03, reach: 0.1 }
     }
+}
+
+impl CullSettings {
+    /// Checks every number against its range.
+    ///
+    /// # Errors
+    /// [`GarmentError::Settings`] names the first number that is outside, with its range.
+    pub fn check(&self) -> Result<(), GarmentError> {
+        check_ranges(&[("margin", self.margin, 0.0..=1.0), ("reach", self.reach, 0.01..=1.0)])
+    }
+}
+
+fn check_ranges(settings: &[(&'static str, f32, RangeInclusive<f32>)]) -> Result<(), GarmentError> {
+    let Some((name, value, range)) = settings.iter().find(|(_, value, range)| !range.contains(value)) else {
+        return Ok(());
+    };
+    Err(GarmentError::Settings { name, value: *value, least: *range.start(), most: *range.end() })
 }
 
 #[cfg(test)]
@@ -153,5 +212,24 @@ mod tests {
         for wrong in [r#"{"labeling":"graph-cut"}"#, r#"{"labelling":"template"}"#, r#"{"rounds":-1}"#] {
             assert!(serde_json::from_str::<ExtractSettings>(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn numbers_outside_their_range_are_refused_by_name() {
+        let extract = ExtractSettings::default();
+        assert_eq!(extract.check(), Ok(()));
+        assert_eq!(ExtractSettings { edge_length: 0.0, ..extract.clone() }.check(), Ok(()));
+        for (wrong, name) in [
+            (ExtractSettings { smoothness: -0.1, ..extract.clone() }, "smoothness"),
+            (ExtractSettings { reach: f32::NAN, ..extract.clone() }, "reach"),
+            (ExtractSettings { rounds: 1_000_000, ..extract.clone() }, "rounds"),
+            (ExtractSettings { edge_length: 1e-6, ..extract.clone() }, "edge_length"),
+        ] {
+            assert!(wrong.check().unwrap_err().to_string().starts_with(name), "{wrong:?}");
+        }
+        assert_eq!((StackSettings::default().check(), CullSettings::default().check()), (Ok(()), Ok(())));
+        let wrong = StackSettings { gap: f32::INFINITY, ..StackSettings::default() };
+        assert_eq!(wrong.check().unwrap_err().to_string(), "gap = inf is outside of its range, 0 to 0.02");
+        assert!(CullSettings { reach: 0.0, ..CullSettings::default() }.check().is_err());
     }
 }

@@ -52,7 +52,7 @@ const PASSES: usize = 6;
 ///
 /// # Errors
 /// [`GarmentError::Mesh`] where a mesh is broken, [`GarmentError::Mismatch`] where there is not a thickness for each
-/// layer. Layers that do not settle are in the report.
+/// layer, [`GarmentError::Settings`] where a setting is outside of its range. Layers that do not settle are in the report.
 pub fn stack(
     body: &Mesh,
     layers: &mut [Mesh],
@@ -60,6 +60,7 @@ pub fn stack(
     settings: &StackSettings,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<StackReport, GarmentError> {
+    settings.check()?;
     check(body, layers, thickness)?;
     let gaps = thickness.iter().map(|t| settings.gap_of(*t));
     let meshes: Vec<(&Mesh, f32)> = std::iter::once((body, 0.0)).chain(layers.iter().zip(gaps)).collect();

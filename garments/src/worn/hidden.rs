@@ -31,8 +31,10 @@ const SHOWN_SHARE: f32 = 0.5;
 /// layer is marked. O(n log n).
 ///
 /// # Errors
-/// [`GarmentError::Mismatch`] where a layer does not have weights for each vertex.
+/// [`GarmentError::Mismatch`] where a layer does not have weights for each vertex, [`GarmentError::Settings`] where a setting
+/// is outside of its range.
 pub fn hidden_triangles(layers: &[Worn], settings: &CullSettings) -> Result<Vec<Vec<bool>>, GarmentError> {
+    settings.check()?;
     if let Some(k) = layers.iter().position(|l| l.mesh.positions.len() != l.weights.len()) {
         let (vertices, weights) = (layers[k].mesh.positions.len(), layers[k].weights.len());
         return Err(GarmentError::Mismatch(format!("layer {k} has {vertices} vertices but weights for {weights}")));
