@@ -219,11 +219,11 @@ fn skin_far_outside_is_counted_and_drawn_in() {
     let truth = person(&model, 21, 0.0);
     let body = model.skinned(&truth.beta);
     let scan = dressed(&model, &truth.beta, &truth.pose, 0.006);
-    // the thighs were found 12 mm too far to the front, farther than what noise explains
+    // the legs were found astray: by 8 mm at the knees, 15 mm at the feet, farther than noise explains
     let mut off = truth.pose.clone();
     for thigh in [Joint::LeftUpperLeg, Joint::RightUpperLeg] {
         let rotation = off.rotation_mut(thigh);
-        *rotation = UnitQuaternion::from_scaled_axis(Vector3::x() * -0.05) * *rotation;
+        *rotation = UnitQuaternion::from_scaled_axis(Vector3::x() * -0.018) * *rotation;
     }
     let settled = settle_under(&model, &body, &off, &scan, &UnderSettings::default()).unwrap();
     let report = settled.report;
@@ -232,7 +232,14 @@ fn skin_far_outside_is_counted_and_drawn_in() {
     let (was, is) =
         (outside(&of(&body.posed(&off)), &scan, 0.002), outside(&of(&settled.mesh.positions), &scan, 0.002));
     assert!((report.outside_before - was).abs() < 0.02 && (report.outside - is).abs() < 1e-9, "{was} {is} {report:?}");
-    assert!(was > 0.05 && is < 0.3 * was, "outside {was} before, {is} after");
+    // feet are thin: what is left of them is counted
+    let legs = |points: &[nalgebra::Point3<f32>]| -> Vec<_> {
+        let is_leg = |r: &Region| matches!(r, Region::LeftLeg | Region::RightLeg);
+        points.iter().zip(&model.regions).filter(|(_, r)| is_leg(r)).map(|(p, _)| *p).collect()
+    };
+    let (was, is) =
+        (outside(&legs(&body.posed(&off)), &scan, 0.002), outside(&legs(&settled.mesh.positions), &scan, 0.002));
+    assert!(was > 0.1 && is < 0.01, "{was} of the legs outside before, {is} after");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! drive the template's skin to the feature points; the difference of the surfaces improves them afterwards).
 
 use nalgebra::{Point3, Vector3};
-use toile_character::{BodyModel, Joint};
+use toile_character::{BodyModel, Joint, Pose};
 
 use crate::{
     FittingError, HandLandmarks,
@@ -20,10 +20,12 @@ const PLACED: f64 = 0.008;
 const PULLS_TO: f64 = 0.03;
 /// Scale of the misfit of a landmark, metres: about a limb's radius.
 const ASTRAY: f64 = 0.05;
-/// How far the whole body moves while landmarks alone drive it: standard deviations in metres and radians (15°, a third
-/// of the way to the next heading that is tried). Landmarks on one limb turn that limb, not the person.
-const ROOT_SHIFT: f64 = 0.1;
-const ROOT_TURN: f64 = 0.26;
+/// Standard deviations while landmarks alone drive the pose: of a joint's turn (57°: limits hold, nothing else is known),
+/// and of how far the whole body moves (metres) and turns (radians, 9°). Landmarks on one limb turn that limb, not the
+/// person.
+const JOINT_TURN: f64 = 1.0;
+const ROOT_SHIFT: f64 = 0.05;
+const ROOT_TURN: f64 = 0.15;
 /// Steps that landmarks alone drive the pose: half a turn of a joint takes thirteen.
 const ITERATIONS: usize = 30;
 /// A step below this ends that, metres and radians: the surface does the rest.
@@ -48,7 +50,8 @@ impl Guides {
     pub fn on(&self, model: &BodyModel, components: usize) -> Option<Guide> {
         let picked = Thinned::of_vertices(self.vertices.clone());
         let body = Articulated::of_model(model, &picked, components);
-        (!self.goals.is_empty()).then(|| Guide { body, goals: self.goals.clone() })
+        let prior = JointPrior::around(Pose::identity(), JOINT_TURN, &model.mean_skeleton);
+        (!self.goals.is_empty()).then(|| Guide { body, goals: self.goals.clone(), prior })
     }
 }
 
@@ -56,6 +59,8 @@ impl Guides {
 pub(crate) struct Guide {
     body: Articulated,
     goals: Vec<Point3<f64>>,
+    /// Of the joints while landmarks alone drive the pose.
+    prior: JointPrior,
 }
 
 impl Guide {
@@ -88,8 +93,8 @@ impl Guide {
     ///
     /// # Errors
     /// [`FittingError::Singular`] where the equations have no solution.
-    pub fn drive(&self, start: State, prior: &JointPrior) -> Result<State, FittingError> {
-        let problem = Driven { guide: self, prior, start: &start, columns: Columns::new(body_joints(), 0) };
+    pub fn drive(&self, start: State) -> Result<State, FittingError> {
+        let problem = Driven { guide: self, start: &start, columns: Columns::new(body_joints(), 0) };
         Ok(descend(&problem, start.clone(), ITERATIONS)?.state)
     }
 }
@@ -97,7 +102,6 @@ impl Guide {
 /// The pose by landmarks alone.
 struct Driven<'a> {
     guide: &'a Guide,
-    prior: &'a JointPrior,
     start: &'a State,
     columns: Columns,
 }
@@ -111,7 +115,7 @@ impl Problem for Driven<'_> {
         let mut equations = NormalEquations::zeros(self.columns.len());
         let frames = self.guide.body.pose(state).frames;
         self.guide.add(&mut equations, state, &self.columns);
-        self.prior.add(&mut equations, state, &frames, &self.columns);
+        self.guide.prior.add(&mut equations, state, &frames, &self.columns);
         let shift = state.pose.translation - self.start.pose.translation;
         (0..3).for_each(|axis| equations.add_single(axis, shift[axis], ROOT_SHIFT));
         let center = self.start.pose.rotation(Joint::Hips);
@@ -125,5 +129,35 @@ impl Problem for Driven<'_> {
 
     fn solved_for(&self) -> &'static str {
         "the pose by landmarks"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+
+    #[test]
+    fn landmarks_on_a_limb_bend_the_limb_and_leave_the_person_standing() {
+        let model = BodyModel::load_default().unwrap();
+        let names = ["leftKneeFront", "leftAnkleOuter", "leftHeel", "leftToeTip"];
+        let mut lifted = Pose::identity();
+        *lifted.rotation_mut(Joint::LeftUpperLeg) = UnitQuaternion::from_scaled_axis(Vector3::x() * -1.4);
+        *lifted.rotation_mut(Joint::LeftLowerLeg) = UnitQuaternion::from_scaled_axis(Vector3::x() * 1.5);
+        let truth = model.posed(&[], &lifted);
+        let at = |name: &str| truth[model.landmark(name).unwrap() as usize];
+        let set = names.iter().map(|n| ((*n).to_owned(), at(n).cast::<f64>().into())).collect();
+        let guide = Guides::new(&model, &set).on(&model, 0).unwrap();
+        let found = guide.drive(State { pose: Pose::identity(), beta: Vec::new() }).unwrap().pose;
+        let posed = model.posed(&[], &found);
+        for name in names {
+            let off = (posed[model.landmark(name).unwrap() as usize] - at(name)).norm();
+            assert!(off < 0.02, "{name} is {off} m off");
+        }
+        let crown = model.landmark("vertex").unwrap() as usize;
+        let moved = (posed[crown] - model.mean[crown]).norm();
+        assert!(moved < 0.15, "the crown moved by {moved} m");
+        assert!(guide.misfit(&State { pose: found, beta: Vec::new() }) < 0.1);
     }
 }

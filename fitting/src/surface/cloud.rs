@@ -3,9 +3,7 @@
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-use toile_geometry::{Mesh, areas::vertex_areas};
-
-use super::point_tree::PointTree;
+use toile_geometry::{Mesh, areas::vertex_areas, point_tree::PointTree};
 
 /// Oriented samples of a surface.
 #[derive(Debug, Clone, Default)]

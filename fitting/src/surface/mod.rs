@@ -1,7 +1,6 @@
 //! Surfaces as the fits look them up: thinned samples with a search tree, and the scan's triangles with their trust.
 
 mod cloud;
-mod point_tree;
 mod scan;
 mod thin;
 

@@ -63,10 +63,7 @@ pub fn pose_under(
                 rayon::join(|| descend(&problem, best.now, settings.fine_iterations), || Inside::new(scan));
             (end.map(|e| Descent { iterations: e.iterations + best.iterations, ..e })?, inside)
         }
-        Method::Seed => {
-            let start = starts.into_iter().next().ok_or(FittingError::Singular { what: "the heading" })?;
-            (seed_pose(&middle, start.now, settings)?, Inside::new(scan))
-        }
+        Method::Seed => (seed_pose(&middle, starts.into_iter().map(|s| s.now), settings)?, Inside::new(scan)),
     };
     progress(0.95);
     let report = report(&fine, &inside, &end, initial);

@@ -12,11 +12,16 @@ use crate::{
 /// Steps of the whole mesh before its joints turn.
 const RIGID_STEPS: usize = 12;
 
-/// The pose from `start` on, which stands near the scan's middle at about its heading.
+/// The pose from the one of `starts` on that the whole mesh fits best; they stand near the scan's middle. The paper does
+/// not say how its search begins.
 ///
 /// # Errors
 /// [`FittingError::Singular`] where the scan leaves a joint undetermined.
-pub(crate) fn seed_pose(sampled: &Sampled, start: State, settings: &UnderSettings) -> Result<Descent, FittingError> {
+pub(crate) fn seed_pose(
+    sampled: &Sampled,
+    starts: impl IntoIterator<Item = State>,
+    settings: &UnderSettings,
+) -> Result<Descent, FittingError> {
     let over = |joints: Vec<Joint>, inside: bool| PointToPoint {
         body: &sampled.body,
         scan: &sampled.scan,
@@ -24,7 +29,16 @@ pub(crate) fn seed_pose(sampled: &Sampled, start: State, settings: &UnderSetting
         norm: Norm::Squared,
         inside,
     };
-    let rigid = descend(&over(vec![Joint::Hips], false), start, RIGID_STEPS)?;
+    let whole = over(vec![Joint::Hips], false);
+    let mut best: Option<(f64, Descent)> = None;
+    for start in starts {
+        let rigid = descend(&whole, start, RIGID_STEPS)?;
+        let off = whole.mean_distance(&rigid.state);
+        if best.as_ref().is_none_or(|b| off < b.0) {
+            best = Some((off, rigid));
+        }
+    }
+    let (_, rigid) = best.ok_or(FittingError::Singular { what: "the heading" })?;
     let chosen = [Joint::Hips].into_iter().chain(settings.joints.iter().copied().filter(|j| *j != Joint::Hips));
     let end = descend(&over(chosen.collect(), settings.inside), rigid.state, settings.fine_iterations)?;
     Ok(Descent { iterations: rigid.iterations + end.iterations, ..end })
