@@ -63,8 +63,8 @@ struct Rule {
     reason: fn(&Evidence) -> String,
 }
 
-/// Shares explained: an arm laid wrongly leaves 0.7 % of the scan over, noise 0.4 % at most. Unusual shapes: people outside the model's
-/// span reach 1.9.
+/// Shares explained: an arm laid wrongly leaves 0.7 % of the scan over, noise 0.4 % at most. Unusual shapes: people of
+/// other sliders than the model's (of the same family of shapes) reach 1.9.
 const ON_SKIN: [Rule; 7] = [
     Rule { doubtful: Bounds::Below(0.995), failed: Bounds::Below(0.80), ..EXPLAINED },
     Rule { doubtful: Bounds::Below(0.60), failed: Bounds::Below(0.25), ..COVERED },
