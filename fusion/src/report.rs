@@ -1,11 +1,11 @@
 //! What the stage decided.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{drop_reason::DropReason, settings::FusionSettings};
 
 /// A frame that was not fused.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DroppedFrame {
     /// Index in the source.
     pub index: u64,
@@ -16,7 +16,7 @@ pub struct DroppedFrame {
 }
 
 /// The volume that was fused.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct VolumeReport {
     /// Radius of the cylinder, metres.
     pub radius_m: f64,
@@ -29,7 +29,7 @@ pub struct VolumeReport {
 }
 
 /// What the stage decided.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FusionReport {
     /// Settings as resolved.
     pub settings: FusionSettings,

@@ -41,7 +41,7 @@ pub struct KnownPose {
 
 /// Settings of the stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
+#[serde(default, deny_unknown_fields)]
 pub struct FusionSettings {
     /// Edge of a voxel, metres. Default 0.004. Smaller resolves more and costs its inverse square.
     pub voxel_size: f64,

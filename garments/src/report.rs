@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toile_character::GarmentType;
 use toile_geometry::{
     Mesh,
@@ -59,7 +59,7 @@ impl std::fmt::Display for Warning {
 }
 
 /// What the extraction decided, for the layer's report.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ExtractionReport {
     /// Known or guessed type.
     pub garment_type: GarmentType,

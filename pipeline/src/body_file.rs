@@ -3,20 +3,38 @@
 use std::{collections::BTreeMap, path::Path};
 
 use nalgebra::Point3;
-use serde::{Deserialize, de::DeserializeOwned};
+use serde::Deserialize;
 use toile_character::{
     BodyModel, Pose, Skeleton, SkinnedMesh,
     joint::{JOINT_COUNT, JOINTS},
 };
+use toile_fitting::ScanLandmark;
 use toile_geometry::ply;
 
-use crate::{PipelineError, folders::Folders, stage};
+use crate::{PipelineError, folders::Folders, json};
 
-/// What later stages need of `body.json`.
+/// What later steps and the page need of `body.json`.
 #[derive(Debug, Clone, Deserialize)]
-struct Shape {
+pub struct BodyFile {
+    /// Standing straight, metres.
+    pub stature_m: f64,
+    /// Girths by name, metres.
+    pub girths_m: BTreeMap<String, f64>,
+    /// Where the girths were taken.
+    pub girths: BTreeMap<String, GirthHeight>,
+    /// Cubic metres.
+    pub volume_m3: f64,
     /// Joints at rest by VRM name, metres.
-    rest_joints: BTreeMap<String, [f64; 3]>,
+    pub rest_joints: BTreeMap<String, [f64; 3]>,
+    /// Landmarks on the scan, in its frame.
+    pub landmarks: Vec<ScanLandmark>,
+}
+
+/// Height of a girth above the soles.
+#[derive(Debug, Clone, Deserialize)]
+pub struct GirthHeight {
+    /// Metres.
+    pub height_m: f64,
 }
 
 /// The fitted body.
@@ -28,13 +46,13 @@ pub struct Body {
 }
 
 impl Body {
-    /// Reads what the stage `fit` wrote; `layer` is the body take's folder name.
+    /// Reads what the step `fit` wrote; `layer` is the body take's folder name.
     ///
     /// # Errors
     /// [`PipelineError`] where a file is missing or not what it should be.
     pub fn load(folders: &Folders, layer: &str, model: &BodyModel) -> Result<Self, PipelineError> {
         let path = folders.body_json();
-        let skeleton = skeleton(&path, &read_json(&path)?)?;
+        let skeleton = skeleton(&path, &json::read(&path)?)?;
         let mut mesh = ply::read(&folders.body_rest())?;
         mesh.recompute_normals();
         let skinned = SkinnedMesh::new(mesh, skeleton, model.weights.clone())?;
@@ -43,11 +61,11 @@ impl Body {
 }
 
 /// The joints as the fit left them, whatever way it found them by.
-fn skeleton(path: &Path, shape: &Shape) -> Result<Skeleton, PipelineError> {
+fn skeleton(path: &Path, body: &BodyFile) -> Result<Skeleton, PipelineError> {
     let mut rest = [Point3::origin(); JOINT_COUNT];
     for joint in JOINTS {
-        let found = shape.rest_joints.get(joint.name());
-        let lacks = || PipelineError::format(path, format!("has no {}; delete it and run again", joint.name()));
+        let found = body.rest_joints.get(joint.name());
+        let lacks = || PipelineError::field(path, "rest_joints", format!("`{}` is missing", joint.name()));
         rest[joint.index()] = found.copied().map(Point3::from).ok_or_else(lacks)?;
     }
     Ok(Skeleton { rest })
@@ -58,29 +76,12 @@ fn skeleton(path: &Path, shape: &Shape) -> Result<Skeleton, PipelineError> {
 /// # Errors
 /// [`PipelineError`] where it is missing or not what it should be.
 pub fn read_pose(path: &Path) -> Result<Pose, PipelineError> {
-    let pose: Pose = read_json(path)?;
+    let pose: Pose = json::read(path)?;
     if pose.rotations.len() == JOINT_COUNT {
         return Ok(pose);
     }
-    let count = pose.rotations.len();
-    Err(PipelineError::format(path, format!("has {count} rotations instead of {JOINT_COUNT}; delete it and run again")))
-}
-
-/// The bytes of a pose file.
-///
-/// # Errors
-/// [`PipelineError::Format`] where the pose holds no numbers.
-pub fn pose_bytes(pose: &Pose) -> Result<Vec<u8>, PipelineError> {
-    stage::pretty(pose)
-}
-
-/// Reads a JSON file of the build folder.
-///
-/// # Errors
-/// [`PipelineError`] where it is missing or not what it should be.
-pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, PipelineError> {
-    let bytes = std::fs::read(path).map_err(|e| PipelineError::io(path, e))?;
-    serde_json::from_slice(&bytes).map_err(|e| PipelineError::format(path, format!("{e}; delete it and run again")))
+    let reason = format!("{} rotations instead of {JOINT_COUNT}; delete it and run again", pose.rotations.len());
+    Err(PipelineError::field(path, "rotations", reason))
 }
 
 #[cfg(test)]
@@ -91,7 +92,7 @@ mod tests {
     fn a_pose_is_read_back() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("pose.json");
-        std::fs::write(&path, pose_bytes(&Pose::identity()).unwrap()).unwrap();
+        std::fs::write(&path, json::pretty(&Pose::identity()).unwrap()).unwrap();
         assert_eq!(read_pose(&path).unwrap(), Pose::identity());
         std::fs::write(&path, "{\"translation\": [0, 0, 0], \"rotations\": []}").unwrap();
         assert!(read_pose(&path).unwrap_err().to_string().contains("0 rotations"));

@@ -2,9 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
+use toile_animation::AnimationError;
+use toile_avatar::AvatarError;
 use toile_capture::CaptureError;
 use toile_character::CharacterError;
+use toile_fitting::FittingError;
+use toile_fusion::FusionError;
+use toile_garments::GarmentError;
 use toile_geometry::GeometryError;
+use toile_render::RenderError;
 
 /// Errors of a run.
 #[derive(Debug, thiserror::Error)]
@@ -26,20 +32,28 @@ pub enum PipelineError {
         path: PathBuf,
     },
     /// A file of the project's own is not what it should be.
-    #[error("{path}: {reason}")]
+    #[error("{path}: {}{reason}", .field.as_ref().map_or(String::new(), |f| format!("`{f}`: ")))]
     Format {
         /// The file.
         path: PathBuf,
+        /// The field in it, where there is one: `stages.fuse.result.frames_seen`.
+        field: Option<String>,
         /// What is wrong and what to do.
         reason: String,
     },
     /// A stage could not give an answer.
-    #[error("{path}: {reason}")]
+    #[error("{path}: {source}")]
     Stage {
         /// The take, scan or file that the stage worked on.
         path: PathBuf,
-        /// What is wrong and what to do.
-        reason: String,
+        /// What the stage said.
+        source: Cause,
+    },
+    /// Another run holds the subject.
+    #[error("{path}: another toile works on this subject; wait for it to end")]
+    Busy {
+        /// The subject's folder.
+        path: PathBuf,
     },
     /// The subject has no such layer.
     #[error("{path} has no layer `{layer}`; it has {has}")]
@@ -51,12 +65,9 @@ pub enum PipelineError {
         /// What there is.
         has: String,
     },
-    /// Another run holds the subject.
-    #[error("{path}: another toile works on this subject; wait for it to end")]
-    Busy {
-        /// The subject's folder.
-        path: PathBuf,
-    },
+    /// A value cannot be written as JSON.
+    #[error("a value cannot be written as JSON: {0}")]
+    Json(#[from] serde_json::Error),
     /// From the recordings.
     #[error(transparent)]
     Capture(CaptureError),
@@ -66,6 +77,29 @@ pub enum PipelineError {
     /// From the body asset.
     #[error(transparent)]
     Character(#[from] CharacterError),
+}
+
+/// Why a stage has no answer.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // a variant a crate
+pub enum Cause {
+    #[error(transparent)]
+    Fusion(#[from] FusionError),
+    #[error(transparent)]
+    Fitting(#[from] FittingError),
+    #[error(transparent)]
+    Garments(#[from] GarmentError),
+    #[error(transparent)]
+    Animation(#[from] AnimationError),
+    #[error(transparent)]
+    Avatar(#[from] AvatarError),
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Image(#[from] image::ImageError),
+    /// The pipeline itself found the input unusable.
+    #[error("{0}")]
+    Refused(String),
 }
 
 impl PipelineError {
@@ -79,13 +113,24 @@ impl PipelineError {
     }
 
     /// A stage's error at `path`.
-    pub fn stage(path: &Path, reason: impl std::fmt::Display) -> Self {
-        Self::Stage { path: path.to_path_buf(), reason: reason.to_string() }
+    pub fn stage(path: &Path, source: impl Into<Cause>) -> Self {
+        Self::Stage { path: path.to_path_buf(), source: source.into() }
+    }
+
+    /// What the pipeline itself refuses at `path`.
+    pub fn refused(path: &Path, reason: impl Into<String>) -> Self {
+        Self::stage(path, Cause::Refused(reason.into()))
     }
 
     /// A format error at `path`.
     pub fn format(path: &Path, reason: impl std::fmt::Display) -> Self {
-        Self::Format { path: path.to_path_buf(), reason: reason.to_string() }
+        Self::Format { path: path.to_path_buf(), field: None, reason: reason.to_string() }
+    }
+
+    /// A format error in a field of the file `path`; an empty field is the whole file.
+    pub fn field(path: &Path, field: &str, reason: impl std::fmt::Display) -> Self {
+        let field = Some(field.to_string()).filter(|f| !f.is_empty());
+        Self::Format { path: path.to_path_buf(), field, reason: reason.to_string() }
     }
 
     /// A short name of the kind of error, for machines.
@@ -97,9 +142,33 @@ impl PipelineError {
             Self::Format { .. } => "format",
             Self::Stage { .. } => "stage",
             Self::Busy { .. } => "busy",
+            Self::Json(_) => "json",
             Self::Capture(_) => "capture",
             Self::Geometry(_) => "geometry",
             Self::Character(_) => "character",
+        }
+    }
+
+    /// The file or folder that it concerns.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Io { path, .. }
+            | Self::DiskFull { path }
+            | Self::Format { path, .. }
+            | Self::Stage { path, .. }
+            | Self::Busy { path }
+            | Self::NoLayer { path, .. }
+            | Self::Capture(CaptureError::Format { path, .. })
+            | Self::Geometry(GeometryError::Format { path, .. }) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// The field of that file, where it is known.
+    pub fn field_name(&self) -> Option<&str> {
+        match self {
+            Self::Format { field, .. } => field.as_deref(),
+            _ => None,
         }
     }
 }

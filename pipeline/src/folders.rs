@@ -15,6 +15,16 @@ impl Folders {
         Self { root: root.to_path_buf() }
     }
 
+    /// Name, date, rig and layers of the subject.
+    pub fn subject_toml(&self) -> PathBuf {
+        self.root.join("subject.toml")
+    }
+
+    /// The recording of a take.
+    pub fn take(&self, layer: &str) -> PathBuf {
+        self.root.join("takes").join(format!("{layer}.mcap"))
+    }
+
     /// Everything that can be built again.
     pub fn build(&self) -> PathBuf {
         self.root.join("build")
@@ -43,6 +53,16 @@ impl Folders {
     /// Corrections by hand of a layer; there need not be any.
     pub fn edits(&self, layer: &str) -> PathBuf {
         self.root.join("edits").join(format!("{layer}.json"))
+    }
+
+    /// What the avatar was made with; there need not be any.
+    pub fn avatar_choice(&self) -> PathBuf {
+        self.root.join("edits").join("avatar.json")
+    }
+
+    /// Motions that were chosen for the avatar.
+    pub fn motions(&self) -> PathBuf {
+        self.root.join("edits").join("motion")
     }
 
     /// The garment as it was cut, in the take's own pose and frame.

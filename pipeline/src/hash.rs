@@ -1,8 +1,9 @@
 //! SHA-256 of files and values, as lower-case hexadecimal.
 
-use std::{fs::File, io::Read, path::Path};
+use std::{io::Read, path::Path};
 
 use sha2::{Digest, Sha256};
+use toile_capture::files::open_regular;
 
 use crate::PipelineError;
 
@@ -12,7 +13,7 @@ use crate::PipelineError;
 /// [`PipelineError::Io`] where it cannot be read.
 pub fn file(path: &Path) -> Result<String, PipelineError> {
     let wrong = |e| PipelineError::io(path, e);
-    let mut file = File::open(path).map_err(wrong)?;
+    let mut file = open_regular(path)?;
     let mut sha = Sha256::new();
     let mut buffer = vec![0; 1 << 18];
     loop {

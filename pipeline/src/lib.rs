@@ -4,39 +4,53 @@
 //! reads what they need from a subject's folder, hands it over, and writes what they give back, whole or not at all:
 //!
 //! - [`process()`]: all stages in their order, up to a [`Goal`];
-//! - [`steps`]: the stages, each a file with what it reads and writes and the one call into the stage's crate;
-//! - [`stage`]: a stage is skipped when its inputs, settings and version are what its record says;
+//! - [`steps`]: the stages, each a [`Step`]: what it reads and writes, what decides its result, and the one call into the
+//!   stage's crate;
+//! - [`Record`]: what `report.json` says of a step; a step is skipped while its record holds;
+//! - [`Settings`]: of all stages, from `toile.toml`;
 //! - [`Run`]: one run over one subject; [`Folders`]: where its files lie;
-//! - [`report`]: the page that an operator reads;
 //! - [`Observer`]: who is told how far a run is.
 //!
 //! A run can stop anywhere and go on later with the same result.
 
-pub mod body_file;
-pub mod disk;
+mod avatar_choice;
+mod body_edits;
+mod body_file;
 mod error;
 mod folders;
 mod garment;
 mod hash;
+pub mod json;
+mod look;
 mod memory;
+mod meshes;
 mod motion;
 mod observer;
 mod opened;
 mod options;
 mod process;
-pub mod report;
+mod record;
+mod report;
+mod resume;
 mod rigged_scan;
 mod run;
-mod skin_attributes;
-pub mod stage;
+pub mod settings;
+mod stale;
+mod step;
 pub mod steps;
 mod summary;
 
-pub use error::PipelineError;
+pub use body_edits::BodyEdits;
+pub use error::{Cause, PipelineError};
 pub use folders::Folders;
+pub use meshes::read_mesh;
 pub use observer::{Observer, Silent};
 pub use opened::Opened;
-pub use options::{Goal, Options};
+pub use options::{FusionChoice, Goal, HiddenChoice, MotionChoice, Options};
 pub use process::process;
+pub use record::Record;
+pub use resume::run_step;
 pub use run::Run;
-pub use summary::Summary;
+pub use settings::Settings;
+pub use step::{Product, Remarks, Step};
+pub use summary::{Decided, Measured, Summary, Take};

@@ -2,26 +2,29 @@
 
 use std::path::Path;
 
-use serde_json::{Value, json};
 use toile_animation::{AnimationError, Bvh, RetargetSettings, Retargeted, bvh, retarget, shipped_walk};
 use toile_character::{BodyModel, Skeleton};
 
 use crate::PipelineError;
 
 /// Name of the clip when no motion was given.
-const WALK: &str = "walk";
+pub const WALK: &str = "walk";
 
 /// Reads the motion and carries it onto `skeleton`.
 ///
 /// # Errors
-/// [`PipelineError`] where the file is no BVH, or its skeleton is no person's.
-pub fn load(path: Option<&Path>, skeleton: &Skeleton) -> Result<Retargeted, PipelineError> {
+/// [`PipelineError`] where the file is not a BVH file, or its skeleton is not a person's.
+pub fn load(
+    path: Option<&Path>,
+    skeleton: &Skeleton,
+    settings: &RetargetSettings,
+) -> Result<Retargeted, PipelineError> {
     let (bvh, name) = match path {
         Some(path) => (read(path)?, path.file_stem().unwrap_or_default().to_string_lossy().into_owned()),
         None => (shipped_walk().map_err(|e| PipelineError::stage(Path::new(WALK), e))?, WALK.to_string()),
     };
     let at = path.unwrap_or(Path::new(WALK));
-    retarget(&bvh, &name, skeleton, &RetargetSettings::default()).map_err(|e| PipelineError::stage(at, e))
+    retarget(&bvh, &name, skeleton, settings).map_err(|e| PipelineError::stage(at, e))
 }
 
 /// Checks a motion before any work is done: read it, and carry it onto the mean person.
@@ -29,12 +32,7 @@ pub fn load(path: Option<&Path>, skeleton: &Skeleton) -> Result<Retargeted, Pipe
 /// # Errors
 /// As [`load`].
 pub fn check(path: &Path) -> Result<(), PipelineError> {
-    load(Some(path), &BodyModel::load_default()?.mean_skeleton).map(drop)
-}
-
-/// What decides the motion besides the file and the body.
-pub fn settings() -> Value {
-    json!(RetargetSettings::default())
+    load(Some(path), &BodyModel::load_default()?.mean_skeleton, &RetargetSettings::default()).map(drop)
 }
 
 fn read(path: &Path) -> Result<Bvh, PipelineError> {

@@ -15,6 +15,8 @@ pub trait Observer: Sync {
     fn at(&self, fraction: f32);
     /// The running step ends.
     fn end(&self);
+    /// Something that the operator should know, in a sentence: a record that was changed by hand.
+    fn remark(&self, sentence: &str);
 }
 
 /// Listens to nothing.
@@ -27,4 +29,5 @@ impl Observer for Silent {
     fn begin(&self, _: &str, _: f64) {}
     fn at(&self, _: f32) {}
     fn end(&self) {}
+    fn remark(&self, _: &str) {}
 }

@@ -26,16 +26,57 @@ pub enum Goal {
 /// What may be chosen for a whole run.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// BVH motion for the avatar; without, the shipped walk.
-    pub motion: Option<PathBuf>,
-    /// How takes are fused.
-    pub fusion: FusionSettings,
-    /// What the joints are called in `avatar.glb`.
-    pub joint_names: JointNaming,
+    /// How the avatar moves.
+    pub motion: MotionChoice,
+    /// What the joints are called in `avatar.glb`; without, as before.
+    pub joint_names: Option<JointNaming>,
+    /// What the avatar leaves out.
+    pub hidden: HiddenChoice,
     /// Stop after this layer; without, all of them.
     pub last_layer: Option<String>,
-    /// Leave out of the avatar what clothes hide; without, it is whole.
-    pub cull: Option<CullSettings>,
+    /// A file of settings beside the subject's own `toile.toml`.
+    pub settings: Option<PathBuf>,
+    /// Settings of the fusion that were chosen for this run alone.
+    pub fusion: FusionChoice,
+}
+
+/// How the avatar moves.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum MotionChoice {
+    /// As when it was made last; the shipped walk the first time.
+    #[default]
+    AsBefore,
+    /// The shipped walk.
+    Walk,
+    /// A BVH file.
+    File(PathBuf),
+}
+
+/// What the avatar leaves out of what clothes hide.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum HiddenChoice {
+    /// As when it was made last; nothing the first time.
+    #[default]
+    AsBefore,
+    /// Nothing: every layer is whole.
+    Whole,
+    /// What no one can see.
+    LeftOut(CullSettings),
+}
+
+/// Changes the settings of the fusion.
+#[derive(Debug, Clone, Default)]
+pub struct FusionChoice {
+    /// What of the frames is fused.
+    pub volume: Option<toile_fusion::Volume>,
+    /// What is assumed about the motion.
+    pub prior: Option<toile_fusion::Prior>,
+    /// Edge of a voxel, metres.
+    pub voxel_size: Option<f64>,
+    /// Truncation distance, metres; without, it scales with the voxels.
+    pub truncation: Option<f64>,
+    /// Known poses.
+    pub poses: Option<Vec<toile_fusion::KnownPose>>,
 }
 
 impl Options {
@@ -44,6 +85,25 @@ impl Options {
     /// # Errors
     /// [`PipelineError`] where the motion cannot be used.
     pub fn check(&self) -> Result<(), PipelineError> {
-        self.motion.as_deref().map_or(Ok(()), motion::check)
+        match &self.motion {
+            MotionChoice::File(path) => motion::check(path),
+            MotionChoice::AsBefore | MotionChoice::Walk => Ok(()),
+        }
+    }
+}
+
+impl FusionChoice {
+    /// The settings with what was chosen.
+    pub fn over(&self, settings: &FusionSettings) -> FusionSettings {
+        let mut chosen = settings.clone();
+        chosen.volume = self.volume.unwrap_or(settings.volume);
+        chosen.prior = self.prior.unwrap_or(settings.prior);
+        if let Some(voxel_size) = self.voxel_size {
+            chosen.truncation *= voxel_size / settings.voxel_size;
+            chosen.voxel_size = voxel_size;
+        }
+        chosen.truncation = self.truncation.unwrap_or(chosen.truncation);
+        chosen.poses = self.poses.clone().or(chosen.poses);
+        chosen
     }
 }

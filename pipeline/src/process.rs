@@ -1,14 +1,20 @@
 //! All stages in their order: from recorded takes to a dressed avatar and its report.
 
-use std::path::Path;
+use std::{fs, path::Path};
 
 use toile_character::BodyModel;
 
 use crate::{
-    Observer, PipelineError, Run, body_file, garment,
+    Observer, PipelineError, Run, Settings,
+    avatar_choice::AvatarChoice,
+    body_file::{Body, BodyFile},
+    garment::{self, Garment},
+    json,
     options::{Goal, Options},
-    steps::{cut, export, fit, fuse, pose, report, stack},
-    summary::Summary,
+    settings, stale,
+    step::Step,
+    steps::{cut::Cut, export::Export, fit::Fit, fuse::Fuse, page::Page, pose::PoseUnder, stack::Stack},
+    summary::{Measured, Summary, Take},
 };
 
 /// Takes the subject at `root` to `goal`, doing whatever is missing.
@@ -16,63 +22,106 @@ use crate::{
 /// # Errors
 /// [`PipelineError`] where a stage has no answer or a file cannot be read or written; what was done stays.
 pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observer) -> Result<Summary, PipelineError> {
-    let mut run = Run::open(root, options.last_layer.as_deref(), observer)?;
+    let settings = settings::read(Some(root), options.settings.as_deref())?;
+    let settings = Settings { fusion: options.fusion.over(&settings.fusion), ..settings };
+    let run = Run::open(root, options.last_layer.as_deref(), settings, observer)?;
     // What would fail only after a long time.
-    (1..run.layers.len()).try_for_each(|n| garment::told_thickness(&run, n).map(drop))?;
-    observer.plan(cost(&run, goal));
-    let mut summary = Summary::default();
+    (1..run.layers.len()).try_for_each(|n| garment::given_thickness(&run, n).map(drop))?;
+    observer.plan(seconds(&run, goal));
+    let mut summary = Summary { layers: vec!["body".into()], ..Summary::default() };
     for layer in &run.layers {
-        summary.add(layer, "fuse", fuse::run(&run, layer, &options.fusion)?);
+        let fuse = summary.hear(run.step(&Fuse::of_layer(&run, layer))?);
+        summary.decided.takes.push(Take { layer: layer.clone(), fuse, pose: None, cut: None });
     }
-    if goal >= Goal::Body {
-        let model = BodyModel::load_default()?;
-        summary.add("body", "fit", fit::run(&run, &model)?);
-        if goal >= Goal::Garments {
-            dress(&mut run, &model, goal, options, &mut summary)?;
-        }
+    if goal == Goal::Scans {
+        summary.files = run.layers.iter().map(|l| run.folders.scan(l)).collect();
+    } else {
+        to_body(&run, goal, options, &mut summary)?;
     }
-    summary.finish(&run, goal, report::measurements(&run).unwrap_or_default());
+    summary.notes.extend(stale::note(&run.folders, goal));
     Ok(summary)
 }
 
-/// From the body to the report.
-fn dress(
-    run: &mut Run,
-    model: &BodyModel,
+/// From the scans to the body, and on.
+fn to_body(run: &Run, goal: Goal, options: &Options, summary: &mut Summary) -> Result<(), PipelineError> {
+    let (model, folders) = (BodyModel::load_default()?, &run.folders);
+    let fit = summary.hear(run.step(&Fit::of_subject(run, &model)?)?);
+    summary.decided.body = Some(fit);
+    let BodyFile { stature_m, girths_m, volume_m3, .. } = json::read(&folders.body_json())?;
+    summary.measurements = Some(Measured { stature_m, girths_m, volume_m3 });
+    summary.files = vec![folders.body_mesh(), folders.body_json()];
+    if goal == Goal::Body {
+        return Ok(());
+    }
+    let body = Body::load(folders, run.first_layer(), &model)?;
+    let garments = dress(run, &model, &body, summary)?;
+    summary.files = garments.iter().map(|g| folders.garment(&g.layer)).collect();
+    if goal == Goal::Garments { Ok(()) } else { deliver(run, &body, &garments, goal, options, summary) }
+}
+
+/// The garments of all takes, stacked; a take in which nothing new is worn gives none.
+fn dress(run: &Run, model: &BodyModel, body: &Body, summary: &mut Summary) -> Result<Vec<Garment>, PipelineError> {
+    let mut garments = Vec::new();
+    for number in 1..run.layers.len() {
+        let pose = summary.hear(run.step(&PoseUnder { run, number, body, model })?);
+        let record = run.step(&Cut { run, number, worn_as: &pose.worn_as_in, body })?;
+        let is_worn = record.failures.is_empty();
+        let cut = summary.hear(record);
+        if is_worn {
+            garments.push(Garment::new(run, number, &cut)?);
+        } else {
+            // Also what an earlier run made of it.
+            remove(&run.folders.garment(&run.layers[number]))?;
+        }
+        (summary.decided.takes[number].pose, summary.decided.takes[number].cut) = (Some(pose), Some(cut));
+    }
+    let stacked = summary.hear(run.step(&Stack { run, body, garments: &garments })?);
+    summary.decided.stack = Some(stacked);
+    summary.layers.extend(garments.iter().map(|g| g.layer.clone()));
+    Ok(garments)
+}
+
+/// The avatar's files, and the page.
+fn deliver(
+    run: &Run,
+    body: &Body,
+    garments: &[Garment],
     goal: Goal,
     options: &Options,
     summary: &mut Summary,
 ) -> Result<(), PipelineError> {
-    let body = body_file::Body::load(&run.folders, run.first_layer(), model)?;
-    for n in 1..run.layers.len() {
-        let layer = run.layers[n].clone();
-        let pose = pose::run(run, n, &body, model)?;
-        let cut = cut::run(run, n, pose::worn_as(run, n, &pose), &body)?;
-        if !cut.failures.is_empty() {
-            run.leave_out(&layer)?;
-        }
-        summary.add(&layer, "pose", pose);
-        summary.add(&layer, "cut", cut);
+    let folders = &run.folders;
+    let before = AvatarChoice::read(folders)?;
+    let choice = AvatarChoice::choose(folders, options)?;
+    if choice == before {
+        summary.notes.extend(choice.in_words().into_iter().map(|what| format!("the avatar keeps {what}")));
     }
-    summary.add("layers", "stack", stack::run(run, &body)?);
-    if goal >= Goal::Avatar {
-        summary.add("avatar", "export", export::run(run, &body, options)?);
-    }
-    if goal >= Goal::Report {
-        report::run(run, &body, options.motion.as_deref(), summary)?;
+    let exported = summary.hear(run.step(&Export { run, body, garments, choice: &choice })?);
+    summary.decided.avatar = Some(exported);
+    summary.files = vec![folders.glb(), folders.vrm()];
+    if goal == Goal::Report {
+        run.step(&Page { run, body, garments, choice: &choice, summary })?;
+        summary.files.push(folders.report());
     }
     Ok(())
 }
 
+fn remove(path: &Path) -> Result<(), PipelineError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(PipelineError::io(path, error)),
+        _ => Ok(()),
+    }
+}
+
 /// Expected seconds to `goal`.
-fn cost(run: &Run, goal: Goal) -> f64 {
+fn seconds(run: &Run, goal: Goal) -> f64 {
     let (takes, garments) = (run.layers.len() as f64, run.layers.len().saturating_sub(1) as f64);
     let costs = [
-        (Goal::Scans, takes * fuse::COST),
-        (Goal::Body, fit::COST),
-        (Goal::Garments, garments * (pose::COST + cut::COST + stack::COST)),
-        (Goal::Avatar, export::COST),
-        (Goal::Report, report::COST),
+        (Goal::Scans, takes * Fuse::SECONDS),
+        (Goal::Body, Fit::SECONDS),
+        (Goal::Garments, garments * (PoseUnder::SECONDS + Cut::SECONDS + Stack::SECONDS)),
+        (Goal::Avatar, Export::SECONDS),
+        (Goal::Report, Page::SECONDS),
     ];
     costs.iter().filter(|c| c.0 <= goal).map(|c| c.1).sum()
 }

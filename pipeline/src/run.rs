@@ -1,29 +1,25 @@
-//! One run over one subject.
+//! One run over one subject, or over a single file.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
 use toile_capture::{LockedSubject, subject::Layer};
 use toile_garments::GarmentType;
-use toile_geometry::{Mesh, obj, ply};
 
-use crate::{Observer, PipelineError, folders::Folders};
+use crate::{Observer, PipelineError, Record, Settings, folders::Folders, resume::run_step, step::Step};
 
-/// One run: where things are, what the layers are, where progress is shown.
+/// One run: where things are, what the layers are, how the stages are set, and who listens.
 pub struct Run<'a> {
     /// Where the files lie.
     pub folders: Folders,
     /// Folder names of the takes in their order, such as `00-body`.
     pub layers: Vec<String>,
-    /// Where progress is shown.
-    pub observer: &'a dyn Observer,
+    /// Settings of all stages.
+    pub settings: Settings,
+    observer: &'a dyn Observer,
     /// The subject, or `None` for a single recording or scan.
     /// Locked: nothing else writes into the subject's folder meanwhile.
-    pub subject: Option<LockedSubject>,
+    subject: Option<LockedSubject>,
     name: String,
-    left_out: Vec<String>,
 }
 
 impl<'a> Run<'a> {
@@ -31,33 +27,43 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// [`PipelineError`] where there is no subject, it has no such layer, or another run works on it.
-    pub fn open(root: &Path, last: Option<&str>, observer: &'a dyn Observer) -> Result<Self, PipelineError> {
+    pub fn open(
+        root: &Path,
+        last: Option<&str>,
+        settings: Settings,
+        observer: &'a dyn Observer,
+    ) -> Result<Self, PipelineError> {
         let subject = LockedSubject::open(root)?;
         check_types(root, subject.layers())?;
         let mut layers: Vec<String> = subject.layers().iter().map(|l| l.label()).collect();
         if layers.is_empty() {
             let reason =
                 "the subject has no take yet; bring one in with `toile import FOLDER --subject DIR --layer body`";
-            return Err(PipelineError::stage(root, reason));
+            return Err(PipelineError::refused(root, reason));
         }
         if let Some(last) = last {
             let found = layers.iter().position(|l| l == last || l.split_once('-').is_some_and(|p| p.1 == last));
-            let count = found.ok_or_else(|| PipelineError::NoLayer {
-                path: root.into(),
-                layer: last.into(),
-                has: layers.join(", "),
-            })?;
-            layers.truncate(count + 1);
+            let has = || layers.join(", ");
+            let missing = || PipelineError::NoLayer { path: root.into(), layer: last.into(), has: has() };
+            let count = found.ok_or_else(missing)? + 1;
+            layers.truncate(count);
         }
         let name = subject.name().to_string();
-        let folders = Folders::new(root);
-        Ok(Self { folders, layers, observer, subject: Some(subject), name, left_out: Vec::new() })
+        Ok(Self { folders: Folders::new(root), layers, settings, observer, subject: Some(subject), name })
     }
 
     /// Over a single file; records name paths relative to `root`.
-    pub fn single(root: &Path, name: &str, observer: &'a dyn Observer) -> Self {
+    pub fn single(root: &Path, name: &str, settings: Settings, observer: &'a dyn Observer) -> Self {
         let (folders, name) = (Folders::new(root), name.to_string());
-        Self { folders, layers: Vec::new(), observer, subject: None, name, left_out: Vec::new() }
+        Self { folders, layers: Vec::new(), settings, observer, subject: None, name }
+    }
+
+    /// Runs a step where its record does not hold any more.
+    ///
+    /// # Errors
+    /// What the step says, or a file that cannot be read or written.
+    pub fn step<S: Step>(&self, step: &S) -> Result<Record<S::Report>, PipelineError> {
+        run_step(step, &self.folders.root, self.observer)
     }
 
     /// What a step is called while it runs.
@@ -68,29 +74,6 @@ impl<'a> Run<'a> {
     /// Folder name of the body take.
     pub fn first_layer(&self) -> &str {
         self.layers.first().map_or("00-body", String::as_str)
-    }
-
-    /// Folder names of the garments in the avatar, inside to outside.
-    pub fn garments(&self) -> impl Iterator<Item = &str> {
-        self.layers.iter().skip(1).filter(|l| !self.left_out.contains(l)).map(String::as_str)
-    }
-
-    /// Their takes' numbers.
-    pub fn garment_numbers(&self) -> impl Iterator<Item = usize> {
-        (1..self.layers.len()).filter(|&n| !self.left_out.contains(&self.layers[n]))
-    }
-
-    /// Leaves a layer in which nothing new was found out of the avatar, with the garment that an earlier run made of it.
-    ///
-    /// # Errors
-    /// [`PipelineError::Io`] where an old file cannot be removed.
-    pub fn leave_out(&mut self, layer: &str) -> Result<(), PipelineError> {
-        let path = self.folders.garment(layer);
-        if path.exists() {
-            fs::remove_file(&path).map_err(|e| PipelineError::io(&path, e))?;
-        }
-        self.left_out.push(layer.to_string());
-        Ok(())
     }
 
     /// What the subject is called.
@@ -115,20 +98,6 @@ impl<'a> Run<'a> {
     /// Thickness of the cloth of the garment that take `n` added, millimetres, where it is told.
     pub fn thickness_mm(&self, n: usize) -> Option<f32> {
         self.subject.as_ref()?.layers().get(n)?.thickness_mm
-    }
-
-    /// The recording of a take.
-    pub fn take(&self, layer: &str) -> PathBuf {
-        self.folders.root.join("takes").join(format!("{layer}.mcap"))
-    }
-
-    /// Reads a mesh (PLY, or OBJ by its extension), or says which file cannot be read.
-    ///
-    /// # Errors
-    /// [`PipelineError`] where the file is missing or no mesh.
-    pub fn read_mesh(&self, path: &Path) -> Result<Mesh, PipelineError> {
-        let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-        Ok(if is_obj { obj::read(path)? } else { ply::read(path)? })
     }
 }
 

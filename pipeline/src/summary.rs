@@ -1,49 +1,105 @@
 //! What a run made, and what is to be said of it.
 
-use serde::Serialize;
+use std::collections::BTreeMap;
 
-use crate::{Run, options::Goal, stage::Record};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use toile_fitting::FitReport;
+use toile_fusion::FusionReport;
+use toile_garments::ExtractionReport;
+
+use crate::{
+    PipelineError, Record, json,
+    step::Remarks,
+    steps::{export::Exported, pose::PoseReport, stack::Stacked},
+};
 
 /// What a run made and what is to be said of it.
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Default)]
 pub struct Summary {
     /// The layers, body first.
     pub layers: Vec<String>,
-    /// Measurements by name: metres, cubic metres.
-    pub measurements: serde_json::Value,
+    /// Measurements of the body, where there is one.
+    pub measurements: Option<Measured>,
     /// The files that were asked for.
-    pub files: Vec<String>,
-    /// What each stage decided, by layer and stage.
-    pub stages: Vec<(String, Record)>,
-    /// What to worry about.
-    pub warnings: Vec<String>,
-    /// Recorded data that was lost.
-    pub lost: Vec<String>,
-    /// What failed although the run went on.
-    pub failures: Vec<String>,
+    pub files: Vec<std::path::PathBuf>,
+    /// What the steps decided.
+    pub decided: Decided,
+    /// What is to be said of it.
+    pub remarks: Remarks,
+    /// What the run did that was not asked for, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Measurements of the body.
+#[derive(Debug, Clone, Serialize)]
+pub struct Measured {
+    /// Standing straight, metres.
+    pub stature_m: f64,
+    /// Girths by name, metres.
+    pub girths_m: BTreeMap<String, f64>,
+    /// Cubic metres.
+    pub volume_m3: f64,
+}
+
+/// What each step decided, as far as the run went.
+#[derive(Debug, Default)]
+pub struct Decided {
+    /// The takes, in their order.
+    pub takes: Vec<Take>,
+    /// The body.
+    pub body: Option<FitReport>,
+    /// All layers together.
+    pub stack: Option<Stacked>,
+    /// The avatar.
+    pub avatar: Option<Exported>,
+}
+
+/// What the steps of one take decided.
+#[derive(Debug)]
+pub struct Take {
+    /// Folder name of the layer.
+    pub layer: String,
+    /// The scan.
+    pub fuse: FusionReport,
+    /// The body in it, where the take is dressed.
+    pub pose: Option<PoseReport>,
+    /// The garment.
+    pub cut: Option<ExtractionReport>,
 }
 
 impl Summary {
-    /// Takes in what a stage said.
-    pub(crate) fn add(&mut self, layer: &str, stage: &str, record: Record) {
-        self.warnings.extend(record.warnings.iter().cloned());
-        self.lost.extend(record.lost.iter().cloned());
-        self.failures.extend(record.failures.iter().cloned());
-        self.stages.push((format!("{layer}/{stage}"), record));
+    /// Takes in what is to be said of a step, and gives what it decided.
+    pub(crate) fn hear<R>(&mut self, record: Record<R>) -> R {
+        self.remarks.warnings.extend(record.warnings);
+        self.remarks.lost.extend(record.lost);
+        self.remarks.failures.extend(record.failures);
+        record.result
     }
+}
 
-    /// Names the layers, the measurements and the files of `goal`.
-    pub(crate) fn finish(&mut self, run: &Run, goal: Goal, measurements: serde_json::Value) {
-        self.layers = std::iter::once("body".to_string()).chain(run.garments().map(String::from)).collect();
-        let folders = &run.folders;
-        let files = match goal {
-            Goal::Scans => run.layers.iter().map(|l| folders.scan(l)).collect(),
-            Goal::Body => vec![folders.body_mesh(), folders.body_json()],
-            Goal::Garments => run.garments().map(|l| folders.garment(l)).collect(),
-            Goal::Avatar => vec![folders.glb(), folders.vrm()],
-            Goal::Report => vec![folders.glb(), folders.vrm(), folders.report()],
-        };
-        self.files = files.iter().map(|p| p.display().to_string()).collect();
-        self.measurements = measurements;
+impl Decided {
+    /// The decisions by layer and step, such as `00-body/fuse`.
+    ///
+    /// # Errors
+    /// [`PipelineError::Json`] where one cannot be written as JSON.
+    pub fn by_step(&self) -> Result<Map<String, Value>, PipelineError> {
+        let mut all = Map::new();
+        for take in &self.takes {
+            all.insert(format!("{}/fuse", take.layer), json::plain(&take.fuse)?);
+            insert(&mut all, format!("{}/pose", take.layer), take.pose.as_ref())?;
+            insert(&mut all, format!("{}/cut", take.layer), take.cut.as_ref())?;
+        }
+        insert(&mut all, "body/fit".into(), self.body.as_ref())?;
+        insert(&mut all, "layers/stack".into(), self.stack.as_ref())?;
+        insert(&mut all, "avatar/export".into(), self.avatar.as_ref())?;
+        Ok(all)
     }
+}
+
+fn insert(all: &mut Map<String, Value>, key: String, report: Option<&impl Serialize>) -> Result<(), PipelineError> {
+    if let Some(report) = report {
+        all.insert(key, json::plain(report)?);
+    }
+    Ok(())
 }

@@ -36,7 +36,7 @@ pub enum Command {
     Import(commands::import::Import),
     /// Record a take from a camera, and see how much of the subject was seen
     Capture(commands::capture::Capture),
-    /// Tell what is in a recording, a folder or a subject, and whether it is healthy
+    /// Show what is in a recording, a folder or a subject, and whether it is healthy
     Inspect(commands::inspect::Inspect),
     /// Fuse takes into scans
     Fuse(commands::fuse::Fuse),
@@ -54,9 +54,11 @@ pub enum Command {
     Process(commands::process::Process),
     /// The whole way on the recorded session that ships with Toile
     Demo(commands::demo::Demo),
+    /// Show the settings of all stages, with units, ranges and defaults
+    Settings(commands::settings::Settings),
     /// Make a synthetic subject with its truth: for training, tests and trials of a rig
     Synthesize(commands::synthesize::Synthesize),
-    /// Tell which cameras are plugged in and what is wrong with them
+    /// List the cameras that are plugged in, and what is wrong with them
     Devices(commands::devices::Devices),
     /// Print completions for a shell
     Completions(commands::completions::Completions),

@@ -27,9 +27,9 @@ impl StudioError {
         Self::Pipeline(PipelineError::io(path, source))
     }
 
-    /// A stage's error at `path`.
-    pub fn stage(path: &Path, reason: impl std::fmt::Display) -> Self {
-        Self::Pipeline(PipelineError::stage(path, reason))
+    /// What the program itself refuses at `path`.
+    pub fn refused(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Pipeline(PipelineError::refused(path, reason))
     }
 
     /// A format error at `path`.
@@ -43,6 +43,22 @@ impl StudioError {
             Self::Usage(_) => "usage",
             Self::Device(_) => "device",
             Self::Pipeline(error) => error.kind(),
+        }
+    }
+
+    /// The file that it concerns, where there is one.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Pipeline(error) => error.file(),
+            Self::Usage(_) | Self::Device(_) => None,
+        }
+    }
+
+    /// The field of that file, where it is known.
+    pub fn field(&self) -> Option<&str> {
+        match self {
+            Self::Pipeline(error) => error.field_name(),
+            Self::Usage(_) | Self::Device(_) => None,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! How a command ended, and how that is told to people, machines and the shell.
 
 use serde_json::{Value, json};
+use toile_capture::printable_path;
 
 use crate::StudioError;
 
@@ -61,12 +62,24 @@ pub fn document(command: &str, answer: &Result<Answer, StudioError>) -> Value {
     let mut document = json!({ "command": command, "outcome": Outcome::of(answer).name() });
     let more = match answer {
         Ok(a) => json!({ "results": a.results, "warnings": a.warnings, "lost": a.lost, "failures": a.failures }),
-        Err(error) => json!({ "error": { "kind": error.kind(), "message": error.to_string() } }),
+        Err(error) => json!({ "error": error_document(error) }),
     };
     if let (Value::Object(document), Value::Object(more)) = (&mut document, more) {
         document.extend(more);
     }
     document
+}
+
+/// What `--json` says of an error: its kind and message, and the file and field that it concerns where they are known.
+pub fn error_document(error: &StudioError) -> Value {
+    let mut told = json!({ "kind": error.kind(), "message": error.to_string() });
+    if let Some(file) = error.file() {
+        told["file"] = printable_path(file).into();
+    }
+    if let Some(field) = error.field() {
+        told["field"] = field.into();
+    }
+    told
 }
 
 #[cfg(test)]

@@ -26,6 +26,7 @@ enum View {
 }
 
 struct State {
+    remarks: Vec<String>,
     label: String,
     /// Cost of what is still to be done, the running step included.
     ahead: f64,
@@ -46,8 +47,16 @@ impl Progress {
             (false, false) => View::Lines,
         };
         let now = Instant::now();
-        let state =
-            State { label: String::new(), ahead: 0.0, done: 0.0, step: 0.0, fraction: 0.0, started: now, said: now };
+        let state = State {
+            remarks: Vec::new(),
+            label: String::new(),
+            ahead: 0.0,
+            done: 0.0,
+            step: 0.0,
+            fraction: 0.0,
+            started: now,
+            said: now,
+        };
         Self { view, state: Mutex::new(state) }
     }
 
@@ -57,6 +66,11 @@ impl Progress {
         state.label = status.to_string();
         state.fraction = status.share.clamp(state.fraction, 1.0);
         self.show(&mut state, false);
+    }
+
+    /// What the steps remarked, once.
+    pub fn take_remarks(&self) -> Vec<String> {
+        std::mem::take(&mut self.state().remarks)
     }
 
     /// Says a line without disturbing the bar.
@@ -128,6 +142,10 @@ impl Observer for Progress {
         state.ahead = (state.ahead - state.step).max(0.0);
         state.done += state.step;
         (state.step, state.fraction) = (0.0, 0.0);
+    }
+
+    fn remark(&self, sentence: &str) {
+        self.state().remarks.push(sentence.to_string());
     }
 }
 

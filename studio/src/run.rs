@@ -8,7 +8,7 @@ use std::{
 
 use clap::{CommandFactory, Parser, error::ErrorKind};
 use toile_capture::{printable, printable_lines};
-use toile_pipeline::stage;
+use toile_pipeline::json;
 use tracing_subscriber::{EnvFilter, fmt::MakeWriter};
 
 use crate::{
@@ -31,8 +31,11 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Outcome {
     };
     let session = Session { progress: Arc::new(Progress::new(cli.globals.quiet)), globals: cli.globals };
     start_log(&session);
-    let answer = start_threads(session.globals.threads).and_then(|()| cli.command.run(&session));
+    let mut answer = start_threads(session.globals.threads).and_then(|()| cli.command.run(&session));
     session.progress.finish();
+    if let Ok(answer) = &mut answer {
+        answer.warnings.extend(session.progress.take_remarks());
+    }
     print(cli.command.name(), &answer, &session.globals);
     Outcome::of(&answer)
 }
@@ -51,6 +54,7 @@ impl Command {
             Self::Export(c) => c.run(session),
             Self::Process(c) => c.run(session),
             Self::Demo(c) => c.run(session),
+            Self::Settings(c) => c.run(session),
             Self::Synthesize(c) => c.run(session),
             Self::Devices(c) => c.run(session),
             Self::Completions(c) => Ok(c.run(Cli::command())),
@@ -70,6 +74,7 @@ impl Command {
             Self::Export(_) => "export",
             Self::Process(_) => "process",
             Self::Demo(_) => "demo",
+            Self::Settings(_) => "settings",
             Self::Synthesize(_) => "synthesize",
             Self::Devices(_) => "devices",
             Self::Completions(_) => "completions",
@@ -144,7 +149,7 @@ fn print(command: &str, answer: &Result<Answer, StudioError>, globals: &Globals)
 }
 
 fn say(document: &serde_json::Value) {
-    let bytes = stage::pretty(document).unwrap_or_default();
+    let bytes = json::pretty(document).unwrap_or_default();
     // A reader that went away is no failure of ours.
     drop(io::stdout().write_all(&bytes));
 }

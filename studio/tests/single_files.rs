@@ -1,6 +1,6 @@
 //! Commands on single scans and recordings, ours and other people's.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)] // all of it is test code
+#![allow(clippy::unwrap_used)] // all of it is test code
 
 mod common;
 
@@ -14,16 +14,6 @@ use serde::Deserialize;
 use serde_json::Value;
 use toile_character::{BodyModel, Joint, JointRegressor};
 use toile_geometry::{Mesh, obj, ply};
-
-/// A folder of the private test data; `None`, with a word, where it is missing.
-fn private(name: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/real/rgbd")).join(name);
-    if !path.is_dir() {
-        println!("skipped: no private test data {name}");
-        return None;
-    }
-    Some(path)
-}
 
 fn json(path: PathBuf) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
@@ -142,7 +132,7 @@ fn what_is_no_person_and_what_is_no_mesh_is_refused() {
 
 #[test]
 fn a_room_seen_by_a_hand_held_camera_is_fused_whole() {
-    let Some(room) = private("sevenscenes_kitchen_a") else { return };
+    let Some(room) = toile_outside::data("real/rgbd/sevenscenes_kitchen_a") else { return };
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("room");
     let words = ["--volume", "all", "--prior", "none", "--voxel", "10"];
@@ -154,7 +144,7 @@ fn a_room_seen_by_a_hand_held_camera_is_fused_whole() {
 
 #[test]
 fn a_real_person_turning_is_imported_and_the_turn_closes() {
-    let Some(person) = private("uva_cv2_person_turn") else { return };
+    let Some(person) = toile_outside::data("real/rgbd/uva_cv2_person_turn") else { return };
     let dir = tempfile::tempdir().unwrap();
     let subject = dir.path().join("person");
     exits(0, toile().arg("import").arg(person).arg("--subject").arg(&subject).args(["--layer", "body"]));

@@ -1,15 +1,16 @@
 //! The recorded session, end to end: every layer is there, any number of threads and any interruption give the same
 //! bytes, and outside programs accept the files.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)] // all of it is test code
+#![allow(clippy::unwrap_used)] // all of it is test code
 
 use std::{
     collections::BTreeMap,
     fs,
+    os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
     process::{Command, Stdio},
     sync::OnceLock,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use nalgebra::Point3;
@@ -29,31 +30,25 @@ fn toile(words: &[&str]) -> Command {
     command
 }
 
-/// The demo of the shipped session, made once with two threads; `None` where there is no session.
-fn demo() -> Option<&'static Path> {
-    static MADE: OnceLock<Option<(tempfile::TempDir, PathBuf)>> = OnceLock::new();
+/// The demo of the shipped session, made once with two threads.
+fn demo() -> &'static Path {
+    static MADE: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
     let made = MADE.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();
-        let subject = run_demo(dir.path(), "2")?;
-        Some((dir, subject))
+        let subject = run_demo(dir.path(), "2");
+        (dir, subject)
     });
-    if made.is_none() {
-        println!("skipped: no recorded session in recorded/");
-    }
-    made.as_ref().map(|m| m.1.as_path())
+    &made.1
 }
 
-fn run_demo(out: &Path, threads: &str) -> Option<PathBuf> {
+fn run_demo(out: &Path, threads: &str) -> PathBuf {
     let recorded = workspace().join("recorded");
-    let has_session = fs::read_dir(&recorded).ok()?.flatten().any(|e| e.path().join("subject.toml").exists());
-    if !has_session {
-        return None;
-    }
-    let words = ["demo", "--recorded", recorded.to_str()?, "--out", out.to_str()?, "--threads", threads, "--json"];
+    let (recorded, folder) = (recorded.to_str().unwrap(), out.to_str().unwrap());
+    let words = ["demo", "--recorded", recorded, "--out", folder, "--threads", threads, "--json"];
     let done = toile(&words).output().unwrap();
     let answer: Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(done.status.code(), Some(0), "{answer}");
-    Some(fs::read_dir(out).unwrap().flatten().map(|e| e.path()).min().unwrap())
+    fs::read_dir(out).unwrap().flatten().map(|e| e.path()).min().unwrap()
 }
 
 /// Every file below a folder by its relative path, but for those that may differ.
@@ -90,7 +85,7 @@ fn glb_json(path: &Path) -> Value {
 
 #[test]
 fn every_take_is_a_layer_of_the_avatar() {
-    let Some(subject) = demo() else { return };
+    let subject = demo();
     let mut wanted: Vec<String> = fs::read_dir(subject.join("takes"))
         .unwrap()
         .flatten()
@@ -112,7 +107,7 @@ fn every_take_is_a_layer_of_the_avatar() {
 
 #[test]
 fn one_thread_and_three_kills_give_the_same_bytes() {
-    let Some(subject) = demo() else { return };
+    let subject = demo();
     let dir = tempfile::tempdir().unwrap();
     let copy = dir.path().join(subject.file_name().unwrap());
     fs::create_dir_all(copy.join("takes")).unwrap();
@@ -121,19 +116,35 @@ fn one_thread_and_three_kills_give_the_same_bytes() {
         fs::copy(take.path(), copy.join("takes").join(take.file_name())).unwrap();
     }
     let words = ["process", copy.to_str().unwrap(), "--threads", "1", "--quiet"];
-    for seconds in [1.0, 5.0, 9.0] {
-        let mut child = toile(&words).stdout(Stdio::null()).spawn().unwrap();
-        std::thread::sleep(Duration::from_secs_f64(seconds));
-        child.kill().unwrap();
-        child.wait().unwrap();
+    // In the first stage, after it, and among the garments.
+    for (there, missing) in [
+        ("takes/00-body.mcap", "build/00-body/scan.ply"),
+        ("build/00-body/scan.ply", "build/body/body.json"),
+        ("build/body/body.json", "avatar.glb"),
+    ] {
+        kill_once(&words, &copy.join(there), Duration::from_millis(700));
+        assert!(!copy.join(missing).exists(), "the run was killed too late to say anything");
     }
     assert_eq!(toile(&words).status().unwrap().code(), Some(0));
     assert_same(subject, &copy);
 }
 
+/// Starts the program and kills it while it works, some time after a file has appeared.
+fn kill_once(words: &[&str], there: &Path, after: Duration) {
+    let mut child = toile(words).stdout(Stdio::null()).spawn().unwrap();
+    let start = Instant::now();
+    while !there.exists() && start.elapsed() < Duration::from_secs(300) {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before {} was there", there.display());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(after);
+    child.kill().unwrap();
+    assert_eq!(child.wait().unwrap().signal(), Some(9), "it was killed, and had not ended by itself");
+}
+
 #[test]
 fn a_second_run_does_nothing() {
-    let Some(subject) = demo() else { return };
+    let subject = demo();
     let times = || -> BTreeMap<PathBuf, _> {
         let of = |p: &PathBuf| fs::metadata(subject.join(p)).unwrap().modified().unwrap();
         files(subject).into_keys().map(|p| (p.clone(), of(&p))).collect()
@@ -157,7 +168,7 @@ fn copied(made: &Path) -> (tempfile::TempDir, PathBuf) {
 
 #[test]
 fn a_stroke_is_kept_heeded_at_each_rebuild_and_forgotten_on_request() {
-    let Some(made) = demo() else { return };
+    let made = demo();
     let (dir, subject) = copied(made);
     let run = |command: &str, more: &[&str]| {
         let output = toile(&[&[command, subject.to_str().unwrap()], more].concat()).output().unwrap();
@@ -188,7 +199,7 @@ fn a_stroke_is_kept_heeded_at_each_rebuild_and_forgotten_on_request() {
 
 #[test]
 fn hidden_skin_is_left_out_on_request_and_comes_back() {
-    let Some(made) = demo() else { return };
+    let made = demo();
     let (_dir, subject) = copied(made);
     let export = |more: &[&str]| {
         let output = toile(&[&["export", subject.to_str().unwrap()], more].concat()).output().unwrap();
@@ -216,10 +227,9 @@ fn hidden_skin_is_left_out_on_request_and_comes_back() {
 
 #[test]
 fn khronos_validator_finds_nothing() {
-    let Some(subject) = demo() else { return };
+    let subject = demo();
     let modules = workspace().join("target/outside/node_modules");
-    if !modules.join("gltf-validator").exists() {
-        println!("skipped: no gltf-validator in target/outside (make test installs it)");
+    if toile_outside::file(&modules.join("gltf-validator")).is_none() {
         return;
     }
     let files = ["avatar.glb", "avatar.vrm", "build/body/rigged_scan.glb"].map(|f| subject.join(f));
@@ -237,11 +247,9 @@ fn khronos_validator_finds_nothing() {
 
 #[test]
 fn assimp_loads_every_layer_and_the_clip() {
-    let Some(subject) = demo() else { return };
-    let Ok(done) = Command::new("assimp").arg("info").arg(subject.join("avatar.glb")).output() else {
-        println!("skipped: no assimp here (make test installs it)");
-        return;
-    };
+    let subject = demo();
+    let Some(assimp) = toile_outside::program("assimp") else { return };
+    let done = Command::new(assimp).arg("info").arg(subject.join("avatar.glb")).output().unwrap();
     let text = String::from_utf8_lossy(&done.stdout);
     let count = |label: &str| -> Option<usize> {
         text.lines().find_map(|l| l.strip_prefix(label)).and_then(|n| n.trim().parse().ok())
@@ -255,4 +263,44 @@ fn assimp_loads_every_layer_and_the_clip() {
         let name = gltf["nodes"][joint.as_u64().unwrap() as usize]["name"].as_str().unwrap();
         assert!(text.lines().any(|l| l.ends_with(&format!("\u{2574}{name}"))), "{name} is missing: {text}");
     }
+}
+
+#[test]
+fn an_avatar_keeps_what_it_was_made_with() {
+    let (dir, subject) = copied(demo());
+    let run = |words: &[&str]| {
+        let output = toile(words).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let path = subject.to_str().unwrap();
+    let motion = dir.path().join("dance.bvh");
+    fs::copy(workspace().join("animation/assets/walk.bvh"), &motion).unwrap();
+    let words = ["--motion", motion.to_str().unwrap(), "--cull-hidden", "--joint-names", "mixamo", "--json"];
+    run(&[&["export", path], &words[..]].concat());
+    let made = ["avatar.glb", "avatar.vrm"].map(|name| fs::read(subject.join(name)).unwrap());
+    fs::remove_file(&motion).unwrap();
+    let told = run(&["process", path, "--json"]);
+    assert!(["avatar.glb", "avatar.vrm"].map(|name| fs::read(subject.join(name)).unwrap()) == made);
+    assert!(told["warnings"].to_string().contains("dance.bvh"), "it says what it keeps: {told}");
+    // All of it can be built again.
+    fs::remove_dir_all(subject.join("build/avatar")).unwrap();
+    run(&["process", path, "--json"]);
+    assert!(fs::read(subject.join("avatar.glb")).unwrap() == made[0]);
+    let walks = run(&["process", path, "--motion", "walk", "--json"]);
+    assert!(!walks["warnings"].to_string().contains("dance.bvh"));
+    assert_eq!(glb_json(&subject.join("avatar.glb"))["animations"][0]["name"], "walk");
+}
+
+#[test]
+fn a_record_changed_by_hand_is_noticed_and_built_again() {
+    let (_dir, subject) = copied(demo());
+    let path = subject.join("build/layers/report.json");
+    let whole = fs::read_to_string(&path).unwrap();
+    let at = whole.find("\"gap_m\": ").unwrap() + 9;
+    fs::write(&path, format!("{}9{}", &whole[..at], &whole[at..])).unwrap();
+    let output = toile(&["process", subject.to_str().unwrap(), "--json"]).output().unwrap();
+    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(told["warnings"][0].as_str().is_some_and(|w| w.contains("build/layers/report.json")), "{told}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), whole);
 }

@@ -1,12 +1,12 @@
 //! The answer for each scan vertex, and why it is so.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Confidence of a label that was turned over against what was measured.
 const TURNED: f32 = 0.5;
 
 /// Why a vertex belongs to the garment or does not: the step that had the last word.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
     /// Its height over the surface worn before, its colour and its place on the body say so.

@@ -1,7 +1,7 @@
 //! What stacking did to each layer.
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toile_geometry::{
     Mesh,
     holes::FILLED,
@@ -15,7 +15,7 @@ use crate::settings::StackSettings;
 pub const GAP_BINS_MM: [f32; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 
 /// What stacking did to one layer.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct LayerReport {
     /// Maximum over the regions of the rounds until nothing was left to push; the limit where something was left.
     pub rounds: usize,

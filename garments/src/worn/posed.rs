@@ -1,7 +1,7 @@
 //! What layers do in other poses when they follow their skin weights alone: crossings between them, and stretch.
 
 use nalgebra::Point3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toile_character::{Pose, Skeleton, SkinWeights, skinning};
 use toile_geometry::{Mesh, bvh::Bvh, intersection::crossings};
 
@@ -23,7 +23,7 @@ pub struct Worn<'a> {
 }
 
 /// What one layer does in other poses.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct PosedReport {
     /// Poses that were looked at.
     pub poses: usize,

@@ -1,8 +1,8 @@
 //! `report.html`: what an operator reads.
 
-pub mod base64;
-pub mod contents;
-pub mod page;
-pub mod pictures;
+mod base64;
+mod contents;
+mod page;
+mod pictures;
 
-pub use contents::{Contents, TakeRow, write};
+pub use contents::{Contents, Figures, write};

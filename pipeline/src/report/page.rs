@@ -1,8 +1,10 @@
 //! A page of text, tables and pictures in one HTML file that needs nothing else.
 
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
 
 use image::RgbImage;
+use rayon::prelude::*;
+use toile_capture::printable_lines;
 
 use crate::{PipelineError, report::base64};
 
@@ -13,6 +15,18 @@ const QUALITY: u8 = 86;
 pub struct Page {
     title: String,
     body: String,
+    /// Headings with their anchors, for the links at the top.
+    headings: Vec<(String, String)>,
+    figures: usize,
+}
+
+/// How large pictures stand beside one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Width {
+    /// Four in a row.
+    Small,
+    /// Two in a row: hems and seams can be judged.
+    Large,
 }
 
 /// A picture with the words under it.
@@ -27,68 +41,80 @@ impl Page {
     /// An empty page.
     pub fn new(title: &str, subtitle: &str) -> Self {
         let body = format!("<header><h1>{}</h1><p>{}</p></header>\n", escape(title), escape(subtitle));
-        Self { title: title.into(), body }
+        Self { title: title.into(), body: body + LINKS_HERE, headings: Vec::new(), figures: 0 }
     }
 
-    /// A heading with an introducing sentence (which may be empty).
+    /// A heading with an introducing sentence (which may be empty); links at the top of the page lead to it.
     pub fn section(&mut self, heading: &str, introduction: &str) {
-        let _ = writeln!(self.body, "<h2>{}</h2>", escape(heading));
+        let anchor = anchor(heading);
+        let _ = writeln!(self.body, "<h2 id=\"{anchor}\">{}</h2>", escape(heading));
+        self.headings.push((heading.into(), anchor));
         if !introduction.is_empty() {
             let _ = writeln!(self.body, "<p class=\"lead\">{}</p>", escape(introduction));
         }
     }
 
-    /// A smaller heading.
+    /// A smaller heading; [`Self::link`] leads to it.
     pub fn subsection(&mut self, heading: &str) {
-        let _ = writeln!(self.body, "<h3>{}</h3>", escape(heading));
+        let _ = writeln!(self.body, "<h3 id=\"{}\">{}</h3>", anchor(heading), escape(heading));
     }
 
-    /// A list of notes; `class` is `good`, `warn` or `bad`.
-    pub fn notes(&mut self, class: &str, notes: &[String]) {
+    /// A list of notes; `class` is `good`, `warn` or `bad`. A note that begins with one of `subjects` and a colon leads
+    /// to the heading of that name.
+    pub fn notes(&mut self, class: &str, notes: &[String], subjects: &[String]) {
         if notes.is_empty() {
             return;
         }
         let _ = write!(self.body, "<ul class=\"notes {class}\">");
         for note in notes {
-            let _ = write!(self.body, "<li>{}</li>", escape(note));
+            let about = note.split_once(": ").filter(|(name, _)| subjects.iter().any(|s| s == name));
+            let _ = match about {
+                Some((name, rest)) => write!(self.body, "<li>{}: {}</li>", link(name), escape(rest)),
+                None => write!(self.body, "<li>{}</li>", escape(note)),
+            };
         }
         self.body.push_str("</ul>\n");
     }
 
-    /// A table; the first column is text, the others are figures.
-    pub fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
+    /// A table; the first column is text, the others are figures. Names in `subjects` lead to their headings.
+    pub fn table(&mut self, head: &[&str], rows: &[Vec<String>], subjects: &[String]) {
         if rows.is_empty() {
             return;
         }
+        let cell = |text: &str| if subjects.iter().any(|s| s == text) { link(text) } else { escape(text) };
         self.body.push_str("<div class=\"scroll\"><table><thead><tr>");
-        for cell in head {
-            let _ = write!(self.body, "<th>{}</th>", escape(cell));
+        for text in head {
+            let _ = write!(self.body, "<th>{}</th>", cell(text));
         }
         self.body.push_str("</tr></thead><tbody>");
         for row in rows {
             self.body.push_str("<tr>");
-            for cell in row {
-                let _ = write!(self.body, "<td>{}</td>", escape(cell));
+            for text in row {
+                let _ = write!(self.body, "<td>{}</td>", cell(text));
             }
             self.body.push_str("</tr>");
         }
         self.body.push_str("</tbody></table></div>\n");
     }
 
-    /// Pictures side by side.
+    /// Pictures side by side; each opens alone, as large as the window.
     ///
     /// # Errors
     /// [`PipelineError::Stage`] where a picture cannot be encoded.
-    pub fn pictures(&mut self, pictures: &[Picture]) -> Result<(), PipelineError> {
-        self.body.push_str("<div class=\"row\">");
-        for Picture { caption, image } in pictures {
-            let (data, caption) = (base64::encode(&jpeg(image)?), escape(caption));
+    pub fn pictures(&mut self, width: Width, pictures: &[Picture]) -> Result<(), PipelineError> {
+        let encoded: Vec<Vec<u8>> = pictures.par_iter().map(|p| jpeg(&p.image)).collect::<Result<_, _>>()?;
+        let class = if width == Width::Large { "row large" } else { "row" };
+        let _ = write!(self.body, "<div class=\"{class}\">");
+        for (Picture { caption, image }, bytes) in pictures.iter().zip(encoded) {
+            let (data, caption, id) = (base64::encode(&bytes), escape(caption), self.figures);
             let (width, height) = image.dimensions();
             let _ = write!(
                 self.body,
-                "<figure><img src=\"data:image/jpeg;base64,{data}\" alt=\"{caption}\" width=\"{width}\" \
-                 height=\"{height}\" loading=\"lazy\"><figcaption>{caption}</figcaption></figure>"
+                "<figure id=\"figure-{id}\"><a href=\"#figure-{id}\"><img src=\"data:image/jpeg;base64,{data}\" \
+                 alt=\"{caption}\" width=\"{width}\" height=\"{height}\" loading=\"lazy\"></a>\
+                 <figcaption>{caption} <a class=\"close\" href=\"#figure-{id}-small\">close</a></figcaption></figure>"
             );
+            self.figures += 1;
         }
         self.body.push_str("</div>\n");
         Ok(())
@@ -96,7 +122,9 @@ impl Page {
 
     /// The whole file.
     pub fn finish(self) -> String {
-        let (title, body) = (escape(&self.title), self.body);
+        let links = self.headings.iter().map(|(heading, at)| format!("<a href=\"#{at}\">{}</a>", escape(heading)));
+        let links = format!("<nav>{}</nav>\n", links.collect::<Vec<_>>().join(" "));
+        let (title, body) = (escape(&self.title), self.body.replacen(LINKS_HERE, &links, 1));
         format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
@@ -105,17 +133,30 @@ impl Page {
     }
 }
 
+/// Where the links to the sections come once all are known.
+const LINKS_HERE: &str = "<!-- links -->\n";
+
+/// A heading as the end of a link.
+fn anchor(heading: &str) -> String {
+    heading.chars().map(|c| if c.is_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
+}
+
+/// A name that leads to the heading of that name.
+fn link(name: &str) -> String {
+    format!("<a href=\"#{}\">{}</a>", anchor(name), escape(name))
+}
+
 fn jpeg(image: &RgbImage) -> Result<Vec<u8>, PipelineError> {
     let mut bytes = Vec::new();
     image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, QUALITY)
         .encode_image(image)
-        .map_err(|e| PipelineError::stage(std::path::Path::new("report.html"), e))?;
+        .map_err(|e| PipelineError::stage(Path::new("report.html"), e))?;
     Ok(bytes)
 }
 
-/// Text as it may stand in HTML.
+/// Text as it may stand in HTML, control characters escaped.
 pub fn escape(text: &str) -> String {
-    text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
+    printable_lines(text).chars().fold(String::with_capacity(text.len()), |mut out, c| {
         match c {
             '&' => out.push_str("&amp;"),
             '<' => out.push_str("&lt;"),
@@ -142,12 +183,20 @@ h2 { margin: 2.5rem 0 .25rem; font-size: 1.3rem; }
 h3 { margin: 1.5rem 0 .25rem; font-size: 1.05rem; }
 .row { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(15.5rem, 45%), 1fr)); gap: .75rem;
   margin: .75rem 0; }
-figure { margin: 0; max-width: 300px; }
-img { display: block; max-width: 100%; height: auto; border-radius: 8px; border: 1px solid var(--line); }
+.row.large { grid-template-columns: repeat(auto-fill, minmax(min(26rem, 100%), 1fr)); }
+figure { margin: 0; }
+figure:target { position: fixed; inset: 0; z-index: 1; background: var(--page); display: grid; place-items: center;
+  align-content: center; padding: 1rem; }
+figure:target img { width: auto; height: calc(100vh - 5rem); max-width: 100%; object-fit: contain; cursor: default; }
+.close { display: none; }
+figure:target .close { display: inline; }
+nav { display: flex; flex-wrap: wrap; gap: .25rem 1.25rem; margin: .75rem 0 0; }
+a { color: inherit; text-decoration-color: var(--soft); text-underline-offset: .2em; }
+img { display: block; width: 100%; height: auto; cursor: zoom-in; border-radius: 8px; border: 1px solid var(--line); }
 figcaption { font-size: .85rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; margin: .75rem 0; font-variant-numeric: tabular-nums; }
-th, td { text-align: right; padding: .35rem .9rem .35rem 0; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th, td { text-align: right; padding: .35rem .9rem .35rem 0; border-bottom: 1px solid var(--line); vertical-align: top; }
 th { color: var(--soft); font-weight: 500; }
 th:first-child, td:first-child { text-align: left; }
 .notes { list-style: none; padding: 0; margin: .75rem 0; }
@@ -166,15 +215,24 @@ mod tests {
     fn a_page_holds_its_pictures_and_escapes_its_text() {
         let mut page = Page::new("anna <1>", "two takes");
         page.section("Scans", "");
-        page.pictures(&[Picture { caption: "front".into(), image: RgbImage::new(4, 4) }]).unwrap();
-        page.table(&["take", "frames"], &[vec!["a & b".into(), "100".into()]]);
-        page.notes("warn", &["the turn is not closed".into()]);
+        page.pictures(Width::Small, &[Picture { caption: "front".into(), image: RgbImage::new(4, 4) }]).unwrap();
+        page.table(&["take", "frames"], &[vec!["a & b\u{1b}[2J".into(), "100".into()]], &[]);
         let html = page.finish();
-        assert!(
-            html.contains("anna &lt;1&gt;")
-                && html.contains("a &amp; b")
-                && html.contains("data:image/jpeg;base64,/9j/")
-        );
+        for part in
+            ["anna &lt;1&gt;", "a &amp; b\\u{1b}[2J", "data:image/jpeg;base64,/9j/", "<a href=\"#scans\">Scans</a>"]
+        {
+            assert!(html.contains(part), "{part} is not in {html}");
+        }
         assert!(!html.contains("http"), "the page must work offline");
+    }
+
+    #[test]
+    fn a_note_leads_to_what_it_is_about() {
+        let mut page = Page::new("anna", "");
+        page.subsection("01-top");
+        page.notes("warn", &["01-top: its hem is unsure".into(), "other: a word".into()], &["01-top".into()]);
+        let html = page.finish();
+        assert!(html.contains("<h3 id=\"01-top\">") && html.contains("<a href=\"#01-top\">01-top</a>: its hem"));
+        assert!(html.contains("<li>other: a word</li>"));
     }
 }

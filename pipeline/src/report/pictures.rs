@@ -15,6 +15,8 @@ use crate::report::page::Picture;
 
 /// Size of a picture of a whole person, pixels.
 const SIZE: (u32, u32) = (300, 440);
+/// Size of a picture in which a hem can be judged: a garment of a metre has pixels of less than 2 mm.
+const LARGE: (u32, u32) = (560, 720);
 /// Distances between body and scan are drawn from 0 to this, millimetres.
 const DISTANCE_RANGE_MM: f32 = 15.0;
 /// Name of the attribute that holds them.
@@ -57,14 +59,7 @@ pub fn scan(mesh: &Mesh) -> Result<Vec<Picture>, RenderError> {
 /// [`RenderError`] where a mesh cannot be drawn.
 pub fn body_over_scan(scan: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderError> {
     let mapped = with_distances(scan, body);
-    let range = (0.0, DISTANCE_RANGE_MM);
-    let mut pictures = Vec::new();
-    for (heading, name) in [(0.0, "front"), (PI, "back")] {
-        let drawn = [Drawn::attribute(&mapped, DISTANCE, range)];
-        let mut picture = one(&drawn, &View::around(heading, 0.0), &format!("scan to body, mm, {name}"))?;
-        picture.image = sheet::scale_bar(&picture.image, range, "mm");
-        pictures.push(picture);
-    }
+    let mut pictures = maps(&mapped, DISTANCE, (0.0, DISTANCE_RANGE_MM), "mm", "scan to body")?;
     pictures.push(one(&[Drawn::clay(body)], &View::front(), "body, front")?);
     pictures.push(one(&[Drawn::clay(body)], &View::around(FRAC_PI_2, 0.0), "body, left side")?);
     Ok(pictures)
@@ -159,40 +154,51 @@ fn cords(lines: &[Vec<[f64; 3]>]) -> Mesh {
     mesh
 }
 
-/// A garment alone (front and back) and on what is worn below it.
+/// A garment alone, front and back, large enough to judge its hems.
 ///
 /// # Errors
 /// [`RenderError`] where a mesh cannot be drawn.
-pub fn garment(garment: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderError> {
-    let mut pictures = vec![
-        one(&[Drawn::colored(garment)], &View::front(), "alone, front")?,
-        one(&[Drawn::colored(garment)], &View::around(PI, 0.0), "alone, back")?,
-    ];
-    let on_body = [Drawn::solid(body, SKIN, 1.0), Drawn::colored(garment)];
-    pictures.push(one(&on_body, &View::front(), "on the body, front")?);
-    pictures.push(one(&on_body, &View::around(PI, 0.0), "on the body, back")?);
-    Ok(pictures)
+pub fn garment(garment: &Mesh) -> Result<Vec<Picture>, RenderError> {
+    let side = |heading: f64, caption: &str| -> Result<Picture, RenderError> {
+        let image = picture(&[Drawn::colored(garment)], &View::around(heading, 0.0), LARGE.0, LARGE.1)?;
+        Ok(Picture { caption: caption.into(), image })
+    };
+    Ok(vec![side(0.0, "alone, front")?, side(PI, "alone, back")?])
 }
 
-/// Where a garment's label is unsure (dark) and what nobody saw of it (bright).
+/// A garment on what is worn below it, and maps of where its border is unsure and of what nobody saw of it.
 ///
 /// # Errors
-/// [`RenderError`] where the mesh cannot be drawn.
-pub fn doubts(garment: &Mesh) -> Result<Vec<Picture>, RenderError> {
-    let mut pictures = Vec::new();
-    for (name, range, caption) in [
-        ("confidence", (0.5, 1.0), "dark: unsure"),
-        ("filled", (0.0, 1.0), "bright: filled"),
-        ("free", (0.0, 1.0), "bright: hangs free"),
-    ] {
+/// [`RenderError`] where a mesh cannot be drawn.
+pub fn garment_worn(garment: &Mesh, body: &Mesh) -> Result<Vec<Picture>, RenderError> {
+    let on_body = [Drawn::solid(body, SKIN, 1.0), Drawn::colored(garment)];
+    let mut pictures = vec![
+        one(&on_body, &View::front(), "on the body, front")?,
+        one(&on_body, &View::around(PI, 0.0), "on the body, back")?,
+    ];
+    let mut garment = garment.clone();
+    if let Some(confidence) = garment.attributes.get("confidence") {
+        // The least that a label can be sure of, one of two, is a doubt of 1.
+        let doubt = confidence.iter().map(|c| 2.0 * (1.0 - c)).collect();
+        garment.attributes.insert("doubt".into(), doubt);
+    }
+    for (name, caption) in [("doubt", "how unsure its border is"), ("filled", "filled: nobody saw it")] {
         if garment.attributes.contains_key(name) {
-            let drawn = [Drawn::attribute(garment, name, range)];
-            for (heading, side) in [(0.0, "front"), (PI, "back")] {
-                pictures.push(one(&drawn, &View::around(heading, 0.0), &format!("{caption}, {side}"))?);
-            }
+            pictures.extend(maps(&garment, name, (0.0, 1.0), "", caption)?);
         }
     }
     Ok(pictures)
+}
+
+/// A map of an attribute, front and back, in the one scale of the page: dark is low, bright is high.
+fn maps(mesh: &Mesh, name: &str, range: (f32, f32), unit: &str, caption: &str) -> Result<Vec<Picture>, RenderError> {
+    let side = |(heading, side): (f64, &str)| -> Result<Picture, RenderError> {
+        let drawn = [Drawn::attribute(mesh, name, range)];
+        let mut map = one(&drawn, &View::around(heading, 0.0), &format!("{caption}, {side}"))?;
+        map.image = sheet::scale_bar(&map.image, range, unit);
+        Ok(map)
+    };
+    [(0.0, "front"), (PI, "back")].into_iter().map(side).collect()
 }
 
 /// All layers beside one another, inside to outside from left to right.

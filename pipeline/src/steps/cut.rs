@@ -1,64 +1,107 @@
-//! Stage `cut`: the new garment out of a dressed take's scan.
+//! Step `cut`: the new garment out of a dressed take's scan.
 //!
-//! Reads the scan, the scan of the take that it is compared with, both poses, the body, and the layer's edits where there are any. Writes `cut.ply`, the garment in the take's
-//! own pose and frame, and `unstacked.ply`, the same in the common frame with its skin weights as vertex attributes. Both are
-//! empty where nothing new is worn: the record then tells of a failure, and the layer is left out.
+//! Reads the scan, the scan of the take that it is compared with, both poses, the body, and the layer's edits where there
+//! are any. Writes `cut.ply`, the garment in the take's own pose and frame, and `unstacked.ply`, the same in the common
+//! frame with its skin weights as vertex attributes. Both are empty where nothing new is worn: the record then has a
+//! failure, and the layer is left out.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde_json::{Value, json};
+use toile_capture::files::read_bytes;
 use toile_fitting::rigged_scan;
-use toile_garments::{Edits, ExtractSettings, Extraction, Take, Warning, extract};
+use toile_garments::{Edits, Extraction, ExtractionReport, Take, Warning, extract};
 use toile_geometry::ply;
 
 use crate::{
     PipelineError, Run,
     body_file::{Body, read_pose},
-    skin_attributes::with_weights,
-    stage::{Product, Record, Stage, plain},
+    json,
+    meshes::{encode_skinned, read_mesh},
+    step::{Product, Remarks, Step},
 };
 
-/// Raised whenever the same inputs and settings give another garment.
-const VERSION: u32 = 7;
-/// Expected seconds.
-pub const COST: f64 = 3.0;
+/// More unsure vertices than this are worth a warning.
+const UNSURE_SHARE: f32 = 0.15;
 
-/// Cuts what take `n` (1 or more) wears and take `worn_as` does not, unless that is up to date.
-///
-/// # Errors
-/// [`PipelineError`] where a mesh is broken, or files cannot be read or written.
-pub fn run(run: &Run, n: usize, worn_as: usize, body: &Body) -> Result<Record, PipelineError> {
-    let told = run.garment_type(n);
-    let folders = &run.folders;
-    let (layer, before) = (run.layers[n].as_str(), run.layers[worn_as].as_str());
-    let settings = ExtractSettings::default();
-    let paths = [layer, before].map(|l| (folders.scan(l), folders.pose(l)));
-    let edits_path = Some(folders.edits(layer)).filter(|p| p.exists());
-    let edits = edits_path.as_deref().map(read_edits).transpose()?;
-    let decides = [
-        paths[0].0.clone(),
-        paths[0].1.clone(),
-        paths[1].0.clone(),
-        paths[1].1.clone(),
-        folders.body_rest(),
-        folders.body_json(),
-        folders.pose(run.first_layer()),
-    ];
-    let stage = Stage {
-        name: "cut",
-        version: VERSION,
-        cost: COST,
-        root: &folders.root,
-        folder: folders.layer(layer),
-        inputs: decides.into_iter().chain(edits_path).collect(),
-        settings: json!({ "extract": plain(&settings)?, "type": told }),
-        outputs: vec![folders.cut(layer), folders.unstacked(layer)],
-        outputs_vary: false,
-    };
-    stage.run(&run.label(layer, "cut"), run.observer, |progress| {
-        let [(scan, pose), (scan_before, pose_before)] = &paths;
-        let (scan, scan_before) = (run.read_mesh(scan)?, run.read_mesh(scan_before)?);
-        let (pose, pose_before) = (read_pose(pose)?, read_pose(pose_before)?);
+/// Cutting out what a take wears and an earlier one does not.
+pub struct Cut<'a> {
+    /// The run.
+    pub run: &'a Run<'a>,
+    /// Number of the take, 1 or more.
+    pub number: usize,
+    /// Folder name of the take that it is worn as, with one layer more.
+    pub worn_as: &'a str,
+    /// The body.
+    pub body: &'a Body,
+}
+
+impl Cut<'_> {
+    fn layer(&self) -> &str {
+        &self.run.layers[self.number]
+    }
+
+    /// The layer's edits, where there are any.
+    fn edits(&self) -> Option<PathBuf> {
+        Some(self.run.folders.edits(self.layer())).filter(|path| path.exists())
+    }
+
+    /// What is to be said of what was found.
+    fn remarks(&self, found: &Extraction) -> Remarks {
+        let layer = self.layer();
+        let (nothing, other): (Vec<_>, Vec<_>) = found.warnings.iter().partition(|w| **w == Warning::NothingNew);
+        let mut warnings: Vec<String> = other.into_iter().map(|w| format!("{layer}: {w}")).collect();
+        if found.report.unsure_share > UNSURE_SHARE {
+            let percent = 100.0 * found.report.unsure_share;
+            warnings.push(format!(
+                "{layer}: {percent:.0} % of the garment could as well be what was worn before; look at its hem"
+            ));
+        }
+        let take = self.run.folders.take(layer);
+        let left_out = |w| {
+            let take = take.display();
+            format!("{take}: {w}; the avatar goes without it; record it again and import it with --retake")
+        };
+        Remarks { warnings, failures: nothing.into_iter().map(left_out).collect(), ..Remarks::default() }
+    }
+}
+
+impl Step for Cut<'_> {
+    type Report = ExtractionReport;
+    const NAME: &'static str = "cut";
+    const VERSION: u32 = 7;
+    const SECONDS: f64 = 3.0;
+
+    fn label(&self) -> String {
+        self.run.label(self.layer(), "cut")
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.run.folders.layer(self.layer())
+    }
+
+    fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
+        let folders = &self.run.folders;
+        let of_takes = [self.layer(), self.worn_as].map(|l| [folders.scan(l), folders.pose(l)]);
+        let of_body = [folders.body_rest(), folders.body_json(), folders.pose(self.run.first_layer())];
+        Ok(of_takes.into_iter().flatten().chain(of_body).chain(self.edits()).collect())
+    }
+
+    fn settings(&self) -> Result<Value, PipelineError> {
+        let garment_type = self.run.garment_type(self.number);
+        Ok(json!({ "extract": json::plain(&self.run.settings.extract)?, "type": garment_type }))
+    }
+
+    fn outputs(&self) -> Vec<PathBuf> {
+        vec![self.run.folders.cut(self.layer()), self.run.folders.unstacked(self.layer())]
+    }
+
+    fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<ExtractionReport>, PipelineError> {
+        let (folders, body) = (&self.run.folders, self.body);
+        let path = folders.scan(self.layer());
+        let (scan, scan_before) = (read_mesh(&path)?, read_mesh(&folders.scan(self.worn_as))?);
+        let (pose, pose_before) = (read_pose(&folders.pose(self.layer()))?, read_pose(&folders.pose(self.worn_as))?);
+        let edits = self.edits().as_deref().map(read_edits).transpose()?;
         let take = Take {
             scan: &scan,
             previous: &rigged_scan(&scan_before, &body.skinned, &pose_before).posed_mesh(&pose),
@@ -67,12 +110,18 @@ pub fn run(run: &Run, n: usize, worn_as: usize, body: &Body) -> Result<Record, P
             skeleton: &body.skinned.skeleton,
             pose: &pose,
             pose0: &body.pose0,
-            garment_type: told,
+            garment_type: self.run.garment_type(self.number),
             edits: edits.as_ref(),
         };
-        let found = extract(&take, &settings, progress).map_err(|e| PipelineError::stage(&paths[0].0, e))?;
-        product(run, layer, &found)
-    })
+        let found = extract(&take, &self.run.settings.extract, progress).map_err(|e| PipelineError::stage(&path, e))?;
+        let contents = [ply::encode(&found.in_take), encode_skinned(&found.garment, &found.weights)];
+        Ok(Product {
+            files: self.outputs().into_iter().zip(contents).collect(),
+            remarks: self.remarks(&found),
+            report: found.report,
+            timings: Value::Null,
+        })
+    }
 }
 
 /// Reads and checks a layer's edits.
@@ -80,36 +129,5 @@ pub fn run(run: &Run, n: usize, worn_as: usize, body: &Body) -> Result<Record, P
 /// # Errors
 /// [`PipelineError::Format`] where the file is not a valid edits file, and why.
 pub fn read_edits(path: &Path) -> Result<Edits, PipelineError> {
-    let bytes = std::fs::read(path).map_err(|e| PipelineError::io(path, e))?;
-    Edits::from_json(&bytes).map_err(|e| PipelineError::format(path, e))
+    Edits::from_json(&read_bytes(path)?).map_err(|e| PipelineError::format(path, e))
 }
-
-fn product(run: &Run, layer: &str, found: &Extraction) -> Result<Product, PipelineError> {
-    let (nothing, other): (Vec<_>, Vec<_>) = found.warnings.iter().partition(|w| **w == Warning::NothingNew);
-    let left_out = |w| {
-        format!(
-            "{}: {w}; the avatar goes without it; record it again and import it with --retake",
-            run.take(layer).display()
-        )
-    };
-    let mut warnings: Vec<String> = other.into_iter().map(|w| format!("{layer}: {w}")).collect();
-    if found.report.unsure_share > UNSURE_SHARE {
-        let percent = 100.0 * found.report.unsure_share;
-        warnings.push(format!(
-            "{layer}: {percent:.0} % of the garment could as well be what was worn before; look at its hem"
-        ));
-    }
-    Ok(Product {
-        files: vec![
-            (run.folders.cut(layer), ply::encode(&found.in_take)),
-            (run.folders.unstacked(layer), ply::encode(&with_weights(&found.garment, &found.weights))),
-        ],
-        result: plain(&found.report)?,
-        warnings,
-        failures: nothing.into_iter().map(left_out).collect(),
-        ..Product::default()
-    })
-}
-
-/// More unsure vertices than this are worth a warning.
-const UNSURE_SHARE: f32 = 0.15;

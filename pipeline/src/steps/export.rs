@@ -1,131 +1,165 @@
-//! Stage `export`: the dressed avatar as files.
+//! Step `export`: the dressed avatar as files, looked at in the poses that it will be seen in.
 //!
 //! Reads the body, every garment with its weights, and the motion. Writes `avatar.glb` and `avatar.vrm`, on request
 //! without what clothes hide.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+use toile_animation::RetargetReport;
 use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, write_glb, write_vrm};
 use toile_character::JointNaming;
 use toile_garments::{CullSettings, GarmentError, Worn, hidden_triangles};
 
 use crate::{
     PipelineError, Run,
+    avatar_choice::AvatarChoice,
     body_file::Body,
-    garment::{garment_type, thickness},
+    garment::Garment,
+    json, look,
+    look::Look,
+    meshes::{read_mesh, read_skinned},
     motion,
-    options::Options,
-    skin_attributes::take_weights,
-    stage::{Product, Record, Stage, plain},
+    step::{Product, Step},
 };
 
-/// Raised whenever the same inputs and settings give other files.
-const VERSION: u32 = 3;
-/// Expected seconds.
-pub const COST: f64 = 0.5;
+/// Writing the avatar's files.
+pub struct Export<'a> {
+    /// The run.
+    pub run: &'a Run<'a>,
+    /// The body.
+    pub body: &'a Body,
+    /// The garments, inside to outside.
+    pub garments: &'a [Garment],
+    /// What the avatar is made with.
+    pub choice: &'a AvatarChoice,
+}
 
-/// Writes the avatar's files with the motion and joint names that `options` choose, unless they are up to date; where
-/// they say so without the triangles that clothes hide, which are counted.
-///
-/// # Errors
-/// [`PipelineError`] where the motion cannot be used or files cannot be read or written.
-pub fn run(run: &Run, body: &Body, options: &Options) -> Result<Record, PipelineError> {
-    let Options { motion: bvh, cull, joint_names, .. } = options;
-    let (bvh, cull) = (bvh.as_deref(), cull.as_ref());
-    let folders = &run.folders;
-    let mut inputs = vec![folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
-    inputs.extend(run.garments().map(|l| folders.garment(l)));
-    inputs.extend(bvh.map(Path::to_path_buf));
-    let garments: Vec<Garment> = run.garment_numbers().map(|n| Garment::new(run, n)).collect::<Result<_, _>>()?;
-    let mut settings = json!({
-        "name": run.title(), "garments": plain(&garments)?, "joint_names": joint_names,
-        "retarget": motion::settings(), "vrm": VrmMeta::default(),
-    });
-    if let Some(cull) = cull {
-        settings["cull"] = plain(cull)?;
+/// What the export decided.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Exported {
+    /// How the motion was carried over.
+    pub motion: RetargetReport,
+    /// Triangles that were left out because clothes hide them, by layer; empty where every layer is whole.
+    pub left_out: BTreeMap<String, LeftOut>,
+    /// What the layers do in the exported motion and in the T-pose of the VRM file.
+    pub look: Look,
+}
+
+/// Triangles of a layer that were left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// Left out.
+    pub triangles: usize,
+    /// Of this many.
+    pub of: usize,
+}
+
+impl Export<'_> {
+    fn motion_path(&self) -> Option<PathBuf> {
+        self.choice.motion_path(&self.run.folders)
     }
-    let stage = Stage {
-        name: "export",
-        version: VERSION,
-        cost: COST,
-        root: &folders.root,
-        folder: folders.avatar(),
-        inputs,
-        settings,
-        outputs: vec![folders.glb(), folders.vrm()],
-        outputs_vary: false,
-    };
-    stage.run(&run.label("avatar", "export"), run.observer, |progress| {
-        let moved = motion::load(bvh, &body.skinned.skeleton)?;
-        let mut avatar = dressed(run, body, garments)?;
-        let mut result = json!({ "motion": moved.report });
-        if let Some(cull) = cull {
-            result["left_out"] =
-                leave_out_hidden(&mut avatar, cull).map_err(|e| PipelineError::stage(&folders.glb(), e))?;
+
+    /// The avatar at rest in scan 0's pose: the body and every garment.
+    fn dressed(&self) -> Result<Avatar, PipelineError> {
+        let (folders, body) = (&self.run.folders, &self.body.skinned);
+        let (name, weights) = ("body".to_string(), body.weights.clone());
+        let mesh = read_mesh(&folders.body_mesh())?;
+        let mut layers = vec![AvatarLayer { name, mesh, weights, order: 0, garment: None, thickness: None }];
+        for garment in self.garments {
+            let (mesh, weights) = read_skinned(&folders.garment(&garment.layer))?;
+            layers.push(AvatarLayer {
+                name: garment.layer.clone(),
+                mesh,
+                weights,
+                order: garment.number as u32,
+                garment: Some(garment.garment_type.to_string()),
+                thickness: Some(garment.thickness),
+            });
         }
-        progress(0.3);
+        let (skeleton, pose0) = (body.skeleton.clone(), self.body.pose0.clone());
+        let (name, joint_names) = (self.run.title().to_string(), JointNaming::Vrm);
+        Ok(Avatar { name, skeleton, joint_names, pose0, layers, motions: Vec::new() })
+    }
+}
+
+impl Step for Export<'_> {
+    type Report = Exported;
+    const NAME: &'static str = "export";
+    const VERSION: u32 = 4;
+    const SECONDS: f64 = 1.0;
+
+    fn label(&self) -> String {
+        self.run.label("avatar", "export")
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.run.folders.avatar()
+    }
+
+    fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
+        let folders = &self.run.folders;
+        let of_body = [folders.body_mesh(), folders.body_json(), folders.pose(self.run.first_layer())];
+        let of_garments = self.garments.iter().map(|g| folders.garment(&g.layer));
+        Ok(of_body.into_iter().chain(of_garments).chain(self.motion_path()).collect())
+    }
+
+    fn settings(&self) -> Result<Value, PipelineError> {
+        Ok(json!({
+            "name": self.run.title(),
+            "garments": json::plain(&self.garments)?,
+            "choice": json::plain(self.choice)?,
+            "retarget": json::plain(&self.run.settings.motion)?,
+            "vrm": json::plain(&VrmMeta::default())?,
+        }))
+    }
+
+    fn outputs(&self) -> Vec<PathBuf> {
+        vec![self.run.folders.glb(), self.run.folders.vrm()]
+    }
+
+    fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<Exported>, PipelineError> {
+        let glb_path = self.run.folders.glb();
+        let wrong = |e: AvatarError| PipelineError::stage(&glb_path, e);
+        let moved =
+            motion::load(self.motion_path().as_deref(), &self.body.skinned.skeleton, &self.run.settings.motion)?;
+        let mut avatar = self.dressed()?;
+        let left_out = match &self.choice.hidden {
+            Some(settings) => {
+                leave_out_hidden(&mut avatar, settings).map_err(|e| PipelineError::stage(&glb_path, e))?
+            }
+            None => BTreeMap::new(),
+        };
+        progress(0.2);
+        let look = look::at(&avatar, &moved.motion);
+        progress(0.5);
         avatar.motions.push(moved.motion);
-        avatar.joint_names = *joint_names;
-        let wrong = |e: AvatarError| PipelineError::stage(&folders.glb(), e);
+        avatar.joint_names = self.choice.joint_names;
         let glb = write_glb(&avatar).map_err(wrong)?;
-        progress(0.6);
+        progress(0.75);
         let vrm = write_vrm(&avatar, &VrmMeta::default()).map_err(wrong)?;
-        Ok(Product { files: vec![(folders.glb(), glb), (folders.vrm(), vrm)], result, ..Product::default() })
-    })
-}
-
-/// What is told of a garment in the files.
-#[derive(Debug, Serialize)]
-struct Garment {
-    number: usize,
-    garment_type: Option<String>,
-    /// Metres.
-    thickness: f32,
-}
-
-impl Garment {
-    fn new(run: &Run, number: usize) -> Result<Self, PipelineError> {
-        let garment_type = garment_type(run, number).map(|t| t.to_string());
-        Ok(Self { number, garment_type, thickness: thickness(run, number)? })
+        let files = self.outputs().into_iter().zip([glb, vrm]).collect();
+        let of_motion = moved.report.warnings.iter().map(|w| format!("motion {}: {w}", look.motion));
+        let warnings = of_motion.chain(look.warnings()).collect();
+        Ok(Product::new(files, Exported { motion: moved.report, left_out, look }, warnings))
     }
 }
 
-/// The avatar at rest in scan 0's pose: the body and every garment.
-fn dressed(run: &Run, body: &Body, garments: Vec<Garment>) -> Result<Avatar, PipelineError> {
-    let folders = &run.folders;
-    let mesh = run.read_mesh(&folders.body_mesh())?;
-    let weights = body.skinned.weights.clone();
-    let mut layers = vec![AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None }];
-    for Garment { number, garment_type, thickness } in garments {
-        let layer = &run.layers[number];
-        let path = folders.garment(layer);
-        let mut mesh = run.read_mesh(&path)?;
-        let weights = take_weights(&mut mesh)
-            .ok_or_else(|| PipelineError::format(&path, "has no skin weights; delete it and run again"))?;
-        let (order, garment, thickness) = (number as u32, garment_type, Some(thickness));
-        layers.push(AvatarLayer { name: layer.clone(), mesh, weights, order, garment, thickness });
-    }
-    let (skeleton, pose0) = (body.skinned.skeleton.clone(), body.pose0.clone());
-    let (name, joint_names) = (run.title().to_string(), JointNaming::Vrm);
-    Ok(Avatar { name, skeleton, joint_names, pose0, layers, motions: Vec::new() })
-}
-
-/// Takes triangles that clothes hide off every layer, and vertices that none uses any more; a layer of which nothing is
-/// left goes as a whole. Returns how many triangles of how many were left out, by layer.
-fn leave_out_hidden(avatar: &mut Avatar, settings: &CullSettings) -> Result<Value, GarmentError> {
+/// Takes triangles that clothes hide off every layer, and vertices that none uses any more; a layer without triangles
+/// goes as a whole.
+fn leave_out_hidden(avatar: &mut Avatar, settings: &CullSettings) -> Result<BTreeMap<String, LeftOut>, GarmentError> {
     let worn: Vec<Worn> = avatar.layers.iter().map(|l| Worn { mesh: &l.mesh, weights: &l.weights }).collect();
     let hidden = hidden_triangles(&worn, settings)?;
-    let mut told = json!({});
+    let mut left_out = BTreeMap::new();
     for (layer, hidden) in avatar.layers.iter_mut().zip(&hidden) {
         let (mesh, old_of_new) = layer.mesh.filter_triangles(|t| !hidden[t]);
-        let (all, left) = (hidden.len(), mesh.triangles.len());
-        told[&layer.name] = json!({ "triangles": all - left, "of": all });
+        let (of, kept) = (hidden.len(), mesh.triangles.len());
+        left_out.insert(layer.name.clone(), LeftOut { triangles: of - kept, of });
         (layer.mesh, layer.weights) = (mesh, layer.weights.gather(&old_of_new));
     }
     avatar.layers.retain(|l| !l.mesh.is_empty());
-    Ok(told)
+    Ok(left_out)
 }
 
 #[cfg(test)]
@@ -163,11 +197,11 @@ mod tests {
         let told = leave_out_hidden(&mut avatar, &CullSettings { margin: 0.03, reach: 0.1 }).unwrap();
         avatar.validate().unwrap();
         assert_eq!(avatar.layers.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["body", "02-coat"]);
-        assert_eq!(told["01-vest"], json!({ "triangles": 32, "of": 32 }));
-        assert_eq!(told["02-coat"], json!({ "triangles": 0, "of": 800 }));
+        assert_eq!(told["01-vest"], LeftOut { triangles: 32, of: 32 });
+        assert_eq!(told["02-coat"], LeftOut { triangles: 0, of: 800 });
         let left = &avatar.layers[0];
-        assert_eq!(told["body"], json!({ "triangles": 1800 - left.mesh.triangles.len(), "of": 1800 }));
-        assert!((1000..1600).contains(&left.mesh.triangles.len()), "{told}");
+        assert_eq!(told["body"], LeftOut { triangles: 1800 - left.mesh.triangles.len(), of: 1800 });
+        assert!((1000..1600).contains(&left.mesh.triangles.len()), "{told:?}");
         assert!(left.mesh.positions.len() < body.mesh.positions.len());
         for (v, p) in left.mesh.positions.iter().enumerate() {
             let old = body.mesh.positions.iter().position(|q| q == p).unwrap();

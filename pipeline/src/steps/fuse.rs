@@ -1,69 +1,84 @@
-//! Stage `fuse`: a take → its scan.
+//! Step `fuse`: a take → its scan.
 //!
 //! Reads a recording (or an importable folder). Writes `scan.ply` and `trajectory.tum`.
 
 use std::path::{Path, PathBuf};
 
-use toile_fusion::{FusionSettings, fuse};
+use serde_json::Value;
+use toile_fusion::{FusionReport, FusionSettings, fuse};
 use toile_geometry::ply;
 
 use crate::{
-    PipelineError, Run,
+    PipelineError, Run, json,
     opened::Opened,
-    stage::{Product, Record, Stage, plain},
+    step::{Product, Remarks, Step},
 };
 
-/// Raised whenever the same recording and settings give another scan.
-const VERSION: u32 = 3;
-/// Expected seconds for a turn of 100 frames.
-pub const COST: f64 = 9.0;
-
-/// Fuses one take of a subject, unless that is up to date.
-///
-/// # Errors
-/// [`PipelineError`] where the take cannot be read, nobody is in it, or files cannot be written.
-pub fn run(run: &Run, layer: &str, settings: &FusionSettings) -> Result<Record, PipelineError> {
-    fuse_recording(run, &run.take(layer), &run.folders.layer(layer), layer, settings)
+/// Fusing one recording.
+pub struct Fuse<'a> {
+    /// The run.
+    pub run: &'a Run<'a>,
+    /// A recording, or an importable folder.
+    pub recording: PathBuf,
+    /// Folder of the files.
+    pub folder: PathBuf,
+    /// What the take is called.
+    pub name: String,
+    /// How it is fused.
+    pub settings: &'a FusionSettings,
 }
 
-/// Fuses any recording or importable folder into `folder`.
-///
-/// # Errors
-/// As [`run`].
-pub fn fuse_recording(
-    run: &Run,
-    recording: &Path,
-    folder: &Path,
-    name: &str,
-    settings: &FusionSettings,
-) -> Result<Record, PipelineError> {
-    let outputs = vec![folder.join("scan.ply"), folder.join("trajectory.tum")];
-    let stage = Stage {
-        name: "fuse",
-        version: VERSION,
-        cost: COST,
-        root: &run.folders.root,
-        folder: folder.to_path_buf(),
-        inputs: files_of(recording)?,
-        settings: plain(settings)?,
-        outputs: outputs.clone(),
-        outputs_vary: false,
-    };
-    stage.run(&run.label(name, "fuse"), run.observer, |progress| {
-        let opened = Opened::new(recording, None)?;
-        let (mut source, lost, dropped) = (opened.source, opened.lost, opened.dropped);
-        let scan = fuse(source.as_mut(), settings, progress).map_err(|e| PipelineError::stage(recording, e))?;
-        let mut warnings: Vec<String> = scan.report.warnings.iter().map(|w| format!("{name}: {w}")).collect();
+impl<'a> Fuse<'a> {
+    /// Fusing a take of the run's subject.
+    pub fn of_layer(run: &'a Run<'a>, layer: &str) -> Self {
+        let (recording, folder) = (run.folders.take(layer), run.folders.layer(layer));
+        Self { run, recording, folder, name: layer.to_string(), settings: &run.settings.fusion }
+    }
+}
+
+impl Step for Fuse<'_> {
+    type Report = FusionReport;
+    const NAME: &'static str = "fuse";
+    const VERSION: u32 = 3;
+    // A turn of 100 frames.
+    const SECONDS: f64 = 9.0;
+
+    fn label(&self) -> String {
+        self.run.label(&self.name, "fuse")
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.folder.clone()
+    }
+
+    fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
+        files_of(&self.recording)
+    }
+
+    fn settings(&self) -> Result<Value, PipelineError> {
+        json::plain(self.settings)
+    }
+
+    fn outputs(&self) -> Vec<PathBuf> {
+        vec![self.folder.join("scan.ply"), self.folder.join("trajectory.tum")]
+    }
+
+    fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<FusionReport>, PipelineError> {
+        let Opened { mut source, lost, dropped } = Opened::new(&self.recording, None)?;
+        let wrong = |e| PipelineError::stage(&self.recording, e);
+        let scan = fuse(source.as_mut(), self.settings, progress).map_err(wrong)?;
+        let mut warnings: Vec<String> = scan.report.warnings.iter().map(|w| format!("{}: {w}", self.name)).collect();
         if dropped > 0 {
-            warnings.push(format!("{name}: {dropped} frames never arrived while recording"));
+            warnings.push(format!("{}: {dropped} frames never arrived while recording", self.name));
         }
-        let files = vec![
-            (outputs[0].clone(), ply::encode(&scan.mesh)),
-            (outputs[1].clone(), scan.trajectory_tum().into_bytes()),
-        ];
-        let (result, timings) = (plain(&scan.report)?, plain(&scan.timings)?);
-        Ok(Product { files, warnings, lost, result, timings, ..Product::default() })
-    })
+        let contents = [ply::encode(&scan.mesh), scan.trajectory_tum().into_bytes()];
+        Ok(Product {
+            files: self.outputs().into_iter().zip(contents).collect(),
+            timings: json::plain(&scan.timings)?,
+            report: scan.report,
+            remarks: Remarks { warnings, lost, ..Remarks::default() },
+        })
+    }
 }
 
 /// The files that make a recording: itself, or everything in its folder, in the order of their names.

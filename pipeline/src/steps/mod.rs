@@ -1,9 +1,9 @@
-//! The stages, each a file: what it reads, what it writes, and the one call into the stage's crate.
+//! The stages, each a step: what it reads and writes, what decides its result, and the one call into the stage's crate.
 
 pub mod cut;
 pub mod export;
 pub mod fit;
 pub mod fuse;
+pub mod page;
 pub mod pose;
-pub mod report;
 pub mod stack;

@@ -1,78 +1,94 @@
-//! Stage `stack`: every garment outside the body and all garments below it.
+//! Step `stack`: every garment outside the body and all garments below it.
 //!
 //! Reads the body and each `unstacked.ply`. Writes each `garment.ply`, in scan 0's pose and frame, with its skin weights
 //! as vertex attributes; layers that lie close over one another have like weights.
 
-use serde_json::json;
-use toile_character::{Pose, SkinWeights};
-use toile_garments::{
-    FREE_PART, LayerReport, PosedReport, StackSettings, TORN, Worn, carry_weights, posed_report, stack,
-};
-use toile_geometry::{Mesh, ply};
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use toile_character::SkinWeights;
+use toile_garments::{FREE_PART, LayerReport, carry_weights, stack};
+use toile_geometry::Mesh;
 
 use crate::{
     PipelineError, Run,
     body_file::Body,
-    garment::thickness,
-    motion,
-    skin_attributes::{take_weights, with_weights},
-    stage::{Product, Record, Stage, plain},
+    garment::Garment,
+    json,
+    meshes::{encode_skinned, read_mesh, read_skinned},
+    step::{Product, Step},
 };
 
-/// Raised whenever the same inputs and settings give other garments.
-const VERSION: u32 = 8;
-/// Expected seconds for each garment.
-pub const COST: f64 = 1.5;
-/// Poses of the shipped walk in which crossings are counted.
-const POSES: usize = 4;
-
-/// Stacks all garments, unless they are up to date.
-///
-/// # Errors
-/// [`PipelineError`] where a mesh is broken, or files cannot be read or written.
-pub fn run(run: &Run, body: &Body) -> Result<Record, PipelineError> {
-    let folders = &run.folders;
-    let garments: Vec<&str> = run.garments().collect();
-    let thickness: Vec<f32> = run.garment_numbers().map(|n| thickness(run, n)).collect::<Result<_, _>>()?;
-    let settings = StackSettings::default();
-    let of_body = [folders.body_mesh(), folders.body_json(), folders.pose(run.first_layer())];
-    let inputs = of_body.into_iter().chain(garments.iter().map(|l| folders.unstacked(l))).collect();
-    let stage = Stage {
-        name: "stack",
-        version: VERSION,
-        cost: COST * garments.len() as f64,
-        root: &folders.root,
-        folder: folders.layers(),
-        inputs,
-        settings: json!({ "stack": plain(&settings)?, "thickness_m": plain(&thickness)? }),
-        outputs: garments.iter().map(|l| folders.garment(l)).collect(),
-        outputs_vary: false,
-    };
-    stage.run(&run.label("layers", "stack"), run.observer, |progress| {
-        let body_mesh = run.read_mesh(&folders.body_mesh())?;
-        let (mut layers, mut weights): (Vec<Mesh>, Vec<SkinWeights>) =
-            garments.iter().map(|l| garment(run, l)).collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-        let wrong = |e| PipelineError::stage(&folders.root, e);
-        let report = stack(&body_mesh, &mut layers, &thickness, &settings, progress).map_err(wrong)?;
-        carry_weights(&layers, &mut weights, &body.skinned.skeleton, &body.pose0).map_err(wrong)?;
-        let walking = walking(body, &body_mesh, &layers, &weights)?;
-        let encoded = layers.iter().zip(&weights).map(|(mesh, w)| ply::encode(&with_weights(mesh, w)));
-        let files = garments.iter().map(|l| folders.garment(l)).zip(encoded).collect();
-        let told = garments.iter().zip(&report.layers).zip(&walking);
-        let warnings = told.flat_map(|((l, report), walking)| warnings(l, report, walking)).collect();
-        let free: Vec<Option<f32>> = layers.iter().map(free_share).collect();
-        let result =
-            json!({ "layers": plain(&report.layers)?, "walking": plain(&walking)?, "free_share": plain(&free)? });
-        Ok(Product { files, result, warnings, ..Product::default() })
-    })
+/// Stacking all garments.
+pub struct Stack<'a> {
+    /// The run.
+    pub run: &'a Run<'a>,
+    /// The body.
+    pub body: &'a Body,
+    /// The garments, inside to outside.
+    pub garments: &'a [Garment],
 }
 
-fn garment(run: &Run, layer: &str) -> Result<(Mesh, SkinWeights), PipelineError> {
-    let path = run.folders.unstacked(layer);
-    let mut mesh = run.read_mesh(&path)?;
-    let weights =
-        take_weights(&mut mesh).ok_or_else(|| PipelineError::format(&path, "has no skin weights; delete it"))?;
-    Ok((mesh, weights))
+/// What stacking decided, by garment from inside to outside.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Stacked {
+    /// How each was moved.
+    pub layers: Vec<LayerReport>,
+    /// Share of each one's vertices that hang free of the body, where it is a skirt or dress.
+    pub free_share: Vec<Option<f32>>,
+}
+
+impl Step for Stack<'_> {
+    type Report = Stacked;
+    const NAME: &'static str = "stack";
+    const VERSION: u32 = 8;
+    // A garment.
+    const SECONDS: f64 = 1.5;
+
+    fn label(&self) -> String {
+        self.run.label("layers", "stack")
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.run.folders.layers()
+    }
+
+    fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
+        let folders = &self.run.folders;
+        let of_body = [folders.body_mesh(), folders.body_json(), folders.pose(self.run.first_layer())];
+        Ok(of_body.into_iter().chain(self.garments.iter().map(|g| folders.unstacked(&g.layer))).collect())
+    }
+
+    fn settings(&self) -> Result<Value, PipelineError> {
+        Ok(json!({ "stack": json::plain(&self.run.settings.stack)?, "garments": json::plain(&self.garments)? }))
+    }
+
+    fn outputs(&self) -> Vec<PathBuf> {
+        self.garments.iter().map(|g| self.run.folders.garment(&g.layer)).collect()
+    }
+
+    fn seconds(&self) -> f64 {
+        Self::SECONDS * self.garments.len() as f64
+    }
+
+    fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<Stacked>, PipelineError> {
+        let folders = &self.run.folders;
+        let body_mesh = read_mesh(&folders.body_mesh())?;
+        let read = self.garments.iter().map(|g| read_skinned(&folders.unstacked(&g.layer)));
+        let (mut layers, mut weights): (Vec<Mesh>, Vec<SkinWeights>) =
+            read.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+        let thickness: Vec<f32> = self.garments.iter().map(|g| g.thickness).collect();
+        let wrong = |e| PipelineError::stage(&folders.layers(), e);
+        let report = stack(&body_mesh, &mut layers, &thickness, &self.run.settings.stack, progress).map_err(wrong)?;
+        carry_weights(&layers, &mut weights, &self.body.skinned.skeleton, &self.body.pose0).map_err(wrong)?;
+        let encoded = layers.iter().zip(&weights).map(|(mesh, weights)| encode_skinned(mesh, weights));
+        let files = self.outputs().into_iter().zip(encoded).collect();
+        let said =
+            self.garments.iter().zip(&report.layers).flat_map(|(g, report)| warnings(&g.layer, report)).collect();
+        let free_share = layers.iter().map(free_share).collect();
+        Ok(Product::new(files, Stacked { layers: report.layers, free_share }, said))
+    }
 }
 
 /// Share of a skirt's or dress's vertices that hang free of the body.
@@ -81,32 +97,13 @@ fn free_share(mesh: &Mesh) -> Option<f32> {
     Some(free.iter().sum::<f32>() / free.len().max(1) as f32)
 }
 
-/// What the layers do in the shipped walk by their weights alone.
-fn walking(
-    body: &Body,
-    body_mesh: &Mesh,
-    layers: &[Mesh],
-    weights: &[SkinWeights],
-) -> Result<Vec<PosedReport>, PipelineError> {
-    let skeleton = &body.skinned.skeleton;
-    let walk = motion::load(None, skeleton)?.motion.poses;
-    // A little more than a quarter each, so that a walk that repeats is not looked at in one phase alone.
-    let at = |k: usize| k * 5 * walk.len() / (4 * POSES) % walk.len();
-    let poses: Vec<Pose> = (0..POSES.min(walk.len())).map(|k| walk[at(k)].clone()).collect();
-    let mut worn = vec![Worn { mesh: body_mesh, weights: &body.skinned.weights }];
-    worn.extend(layers.iter().zip(weights).map(|(mesh, weights)| Worn { mesh, weights }));
-    Ok(posed_report(&worn, skeleton, &body.pose0, &poses).split_off(1))
-}
-
-/// What is to be looked at: in the pose of the scans, and in the walk.
-fn warnings(layer: &str, report: &LayerReport, walking: &PosedReport) -> Vec<String> {
+/// What is to be looked at in the pose of the scans.
+fn warnings(layer: &str, report: &LayerReport) -> Vec<String> {
     let (pairs, cut, [before, after]) = (report.crossing_pairs, report.cut_triangles, report.self_crossings);
-    let torn = walking.torn_most;
-    let told = [
+    let found = [
         (pairs > 0, format!("{pairs} pairs of triangles still cut through a layer below")),
         (cut > 0, format!("{cut} triangles were cut out because they crossed a layer below")),
         (after > before, format!("stacking left {after} pairs of its triangles crossing each other, {before} before")),
-        (torn > 0, format!("{torn} triangles stretch more than {TORN:.0} times in the walk")),
     ];
-    told.into_iter().filter(|(is_so, _)| *is_so).map(|(_, what)| format!("{layer}: {what}")).collect()
+    found.into_iter().filter(|(is_so, _)| *is_so).map(|(_, what)| format!("{layer}: {what}")).collect()
 }

@@ -4,9 +4,18 @@ use std::{
     fs,
     path::{Path, PathBuf},
 };
-use toile_pipeline::{Options, disk};
+use toile_capture::{
+    files::{atomic_write, read_bytes},
+    printable_path,
+};
+use toile_pipeline::Options;
 
-use crate::{StudioError, commands::process, outcome::Answer, session::Session};
+use crate::{
+    StudioError,
+    commands::{process, reach::motion_choice},
+    outcome::Answer,
+    session::Session,
+};
 
 const AFTER: &str = "\
 Copies the session of recorded/ to demo/ beside it, processes it, and says where to look.
@@ -47,8 +56,11 @@ impl Demo {
             copy_subject(subject, &copy)?;
             copies.push(copy);
         }
-        let mut answer =
-            process::process(&copies, &Options { motion: self.motion.clone(), ..Options::default() }, session)?;
+        let mut answer = process::process(
+            &copies,
+            &Options { motion: motion_choice(self.motion.as_deref()), ..Options::default() },
+            session,
+        )?;
         answer.text.push_str("open the report in a browser; drop the GLB into Blender, or any viewer of glTF\n");
         Ok(answer)
     }
@@ -89,6 +101,14 @@ fn copy(from: &Path, to: &Path) -> Result<(), StudioError> {
     if !from.exists() {
         return Ok(());
     }
-    let bytes = fs::read(from).map_err(|e| StudioError::io(from, e))?;
-    if fs::read(to).is_ok_and(|old| old == bytes) { Ok(()) } else { Ok(disk::write_whole(to, &bytes)?) }
+    let bytes = read_bytes(from)?;
+    match fs::read(to) {
+        Ok(old) if old == bytes => Ok(()),
+        Ok(_) => Err(StudioError::Usage(format!(
+            "{} is there already and is not a copy of {}; choose another --out, nothing recorded is overwritten",
+            printable_path(to),
+            printable_path(from)
+        ))),
+        Err(_) => Ok(atomic_write(to, &bytes)?),
+    }
 }

@@ -6,6 +6,7 @@ use std::{
 };
 
 use serde_json::{Value, json};
+use toile_capture::printable_path;
 use toile_driver_realsense as realsense;
 use toile_driver_stereo::{self as stereo, nodes::WideNode};
 use toile_driver_transport::{
@@ -52,9 +53,11 @@ fn install() -> Result<Answer, StudioError> {
     let vendors: Vec<u16> = nodes.into_iter().filter_map(|node| Some(node.usb?.id.0)).collect();
     let path =
         udev::install(Path::new(udev::RULES_FOLDER), &vendors).map_err(|e| StudioError::Device(e.to_string()))?;
-    let text =
-        format!("{}\nRun `udevadm control --reload` (as root), then plug the cameras in again.\n", path.display());
-    Ok(Answer { text, results: json!({ "rule": path }), ..Answer::default() })
+    let text = format!(
+        "{}\nRun `udevadm control --reload` (as root), then plug the cameras in again.\n",
+        printable_path(&path)
+    );
+    Ok(Answer { text, results: json!({ "rule": printable_path(&path) }), ..Answer::default() })
 }
 
 /// Each kind of bus is asked by itself: that one cannot be read must not hide the others.

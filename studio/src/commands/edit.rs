@@ -5,8 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use toile_capture::{files::atomic_write, printable_path};
 use toile_garments::Edits;
-use toile_pipeline::{Goal, Options, Run, disk, process, stage::pretty, steps::cut::read_edits};
+use toile_pipeline::{Folders, Goal, Options, Run, json, process, read_mesh, settings, steps::cut::read_edits};
 
 use crate::{
     StudioError,
@@ -59,12 +60,20 @@ impl Edit {
         let options = Options { last_layer: Some(self.layer.clone()), ..Options::default() };
         process(&self.subject, Goal::Scans, &options, session.progress.as_ref())?;
         self.store(edits, session)?;
-        reach(&self.subject, Goal::Garments, &Options::default(), session)
+        let folders = Folders::new(&self.subject);
+        // What was made of the garment before must not stay behind.
+        let goal = match (folders.report().exists(), folders.glb().exists()) {
+            (true, _) => Goal::Report,
+            (_, true) => Goal::Avatar,
+            _ => Goal::Garments,
+        };
+        reach(&self.subject, goal, &Options::default(), session)
     }
 
     /// Puts the edits where the layer's rebuild finds them.
     fn store(&self, edits: Option<(&Path, Edits)>, session: &Session) -> Result<(), StudioError> {
-        let run = Run::open(&self.subject, Some(&self.layer), session.progress.as_ref())?;
+        let settings = settings::read(Some(&self.subject), None)?;
+        let run = Run::open(&self.subject, Some(&self.layer), settings, session.progress.as_ref())?;
         let layer = run.layers.last().map_or("", String::as_str);
         if layer == run.first_layer() {
             return Err(StudioError::Usage(format!("{layer} is the body: only garments have edits")));
@@ -73,14 +82,16 @@ impl Edit {
         let Some((file, mut edits)) = edits else {
             return if path.exists() { fs::remove_file(&path).map_err(|e| StudioError::io(&path, e)) } else { Ok(()) };
         };
-        edits.check_on(&run.read_mesh(&run.folders.scan(layer))?).map_err(|e| StudioError::format(file, e))?;
+        edits.check_on(&read_mesh(&run.folders.scan(layer))?).map_err(|e| StudioError::format(file, e))?;
         if self.add && path.exists() {
             let Edits { strokes, hems, .. } = std::mem::take(&mut edits);
             edits = read_edits(&path)?;
             edits.strokes.extend(strokes);
             edits.hems.extend(hems);
-            edits.check().map_err(|e| StudioError::format(file, format!("together with {}: {e}", path.display())))?;
+            edits
+                .check()
+                .map_err(|e| StudioError::format(file, format!("together with {}: {e}", printable_path(&path))))?;
         }
-        Ok(disk::write_whole(&path, &pretty(&edits)?)?)
+        Ok(atomic_write(&path, &json::pretty(&edits)?)?)
     }
 }

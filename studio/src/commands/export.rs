@@ -1,19 +1,23 @@
 //! `toile export`: the avatar's files, or a recording in a plain encoding.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use toile_capture::{Replay, export_standard};
+use toile_capture::{
+    Replay, export_standard,
+    files::{atomic_write, read_bytes},
+    printable_path,
+};
 use toile_character::JointNaming;
 use toile_garments::CullSettings;
-use toile_pipeline::{Goal, Options, disk};
+use toile_pipeline::{Goal, HiddenChoice, Options};
 
 use crate::{
     StudioError,
-    commands::reach::{must_exist, reach},
+    commands::{
+        output::{check_model, check_new},
+        reach::{motion_choice, must_exist, reach},
+    },
     outcome::Answer,
     session::Session,
 };
@@ -25,6 +29,8 @@ folder; what is missing before is run. A recording can be converted so that othe
 With --cull-hidden both files lack what no one can see under closed cloth: body and lower layers end --cull-margin
 inside of each hem, collar and cuff. Head, hands and feet stay, and what only loose or open cloth covers. The files are
 smaller, and nothing can poke through where nothing is; export again without it for whole layers.
+
+Motion, joint names and what is left out are remembered in SUBJECT/edits/: later runs make the same avatar.
 
 Examples:
   toile export anna --motion dance.bvh
@@ -39,13 +45,13 @@ Examples:
 pub struct Export {
     /// The subject; with --mcap a recording
     path: PathBuf,
-    /// BVH motion for the avatar (without: a walk that ships with Toile)
+    /// BVH motion for the avatar, or `walk` for the one that ships with Toile (without: as the avatar was made last)
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
     /// What the joints are called in avatar.glb: as VRM names its bones, by H-Anim, or as Mixamo does, which other
-    /// programs map by themselves
-    #[arg(long, value_enum, default_value_t = Names::Vrm)]
-    joint_names: Names,
+    /// programs map by themselves (without: as the avatar was made last; vrm the first time)
+    #[arg(long, value_enum)]
+    joint_names: Option<Names>,
     /// Put a copy of the GLB here
     #[arg(long, value_name = "FILE")]
     glb: Option<PathBuf>,
@@ -58,6 +64,9 @@ pub struct Export {
     /// Keep this much inside of hems and openings, along the surface [default: 30]
     #[arg(long, value_name = "MM", requires = "cull_hidden")]
     cull_margin: Option<f32>,
+    /// Settings of the stages; they win over those of SUBJECT/toile.toml
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
     /// Convert a recording: depth as plain 16-bit images (16UC1), which other viewers display
     #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "joint_names", "glb", "vrm", "cull_hidden"])]
     mcap: Option<PathBuf>,
@@ -89,34 +98,40 @@ impl Export {
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         must_exist(&self.path)?;
         if let Some(plain) = &self.mcap {
+            check_new(plain)?;
             return convert(&self.path, plain);
         }
-        let (cull, joint_names) = (self.cull()?, self.joint_names.into());
-        let options = Options { motion: self.motion.clone(), cull, joint_names, ..Options::default() };
+        [&self.glb, &self.vrm].into_iter().flatten().try_for_each(|copy| check_model(copy))?;
+        let options = Options {
+            motion: motion_choice(self.motion.as_deref()),
+            joint_names: self.joint_names.map(Into::into),
+            hidden: self.hidden()?,
+            settings: self.settings.clone(),
+            ..Options::default()
+        };
         options.check()?;
         let mut answer = reach(&self.path, Goal::Avatar, &options, session)?;
         for (copy, name) in [(&self.glb, "avatar.glb"), (&self.vrm, "avatar.vrm")] {
             let Some(copy) = copy else { continue };
-            let made = self.path.join(name);
-            let bytes = fs::read(&made).map_err(|e| StudioError::io(&made, e))?;
-            disk::write_whole(copy, &bytes)?;
-            answer.text.push_str(&format!("{}\n", copy.display()));
+            atomic_write(copy, &read_bytes(&self.path.join(name))?)?;
+            answer.text.push_str(&format!("{}\n", printable_path(copy)));
         }
         answer.text.push_str(&left_out(&answer.results));
         Ok(answer)
     }
 
-    fn cull(&self) -> Result<Option<CullSettings>, StudioError> {
+    fn hidden(&self) -> Result<HiddenChoice, StudioError> {
         let defaults = CullSettings::default();
         let margin = self.cull_margin.map_or(defaults.margin, |mm| mm * 1e-3);
         if !(0.0..=1.0).contains(&margin) {
             return Err(StudioError::Usage(format!("--cull-margin {} is not between 0 and 1000 mm", margin * 1e3)));
         }
-        Ok(self.cull_hidden.then_some(CullSettings { margin, ..defaults }))
+        let left_out = HiddenChoice::LeftOut(CullSettings { margin, ..defaults });
+        Ok(if self.cull_hidden { left_out } else { HiddenChoice::Whole })
     }
 }
 
-/// A line a layer of which something was left out.
+/// A line for each layer that something was left out of.
 fn left_out(results: &Value) -> String {
     let layers = results["stages"]["avatar/export"]["left_out"].as_object();
     let line = |(layer, told): (&String, &Value)| {
@@ -126,9 +141,10 @@ fn left_out(results: &Value) -> String {
 }
 
 fn convert(recording: &Path, plain: &Path) -> Result<Answer, StudioError> {
-    let lost = Replay::open(recording)?.lost().map(|l| format!("{}: {l}", recording.display())).into_iter().collect();
+    let lost =
+        Replay::open(recording)?.lost().map(|l| format!("{}: {l}", printable_path(recording))).into_iter().collect();
     let written = export_standard(recording, plain)?;
-    let text = format!("{}: {} frames\n", plain.display(), written.frames);
-    let results = json!({ "file": plain, "frames": written.frames, "bytes": written.bytes });
+    let text = format!("{}: {} frames\n", printable_path(plain), written.frames);
+    let results = json!({ "file": printable_path(plain), "frames": written.frames, "bytes": written.bytes });
     Ok(Answer { text, results, lost, ..Answer::default() })
 }

@@ -25,6 +25,9 @@ pub struct Extract {
     subject: PathBuf,
     /// Stop after this layer, such as `trousers` or `01-trousers`
     layer: Option<String>,
+    /// Settings of the stages; they win over those of SUBJECT/toile.toml
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
 }
 
 impl Extract {
@@ -34,7 +37,7 @@ impl Extract {
     /// [`StudioError`] where a stage has no answer or files cannot be read or written.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         must_exist(&self.subject)?;
-        let options = Options { last_layer: self.layer.clone(), ..Options::default() };
+        let options = Options { last_layer: self.layer.clone(), settings: self.settings.clone(), ..Options::default() };
         reach(&self.subject, Goal::Garments, &options, session)
     }
 }

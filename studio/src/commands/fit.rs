@@ -3,15 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
+use toile_capture::printable_path;
 use toile_character::BodyModel;
 use toile_pipeline::{
-    Folders, Goal, Observer, Options, Run,
-    steps::fit::{self, BodyEdits},
+    BodyEdits, Folders, Goal, Observer, Options, Run, Step, settings,
+    steps::fit::{FILES, Fit as FitStep},
 };
 
 use crate::{
     StudioError,
-    commands::reach::{must_exist, reach},
+    commands::{
+        output::check_stage,
+        reach::{must_exist, reach},
+    },
     outcome::Answer,
     session::Session,
 };
@@ -50,6 +54,9 @@ pub struct Person {
     /// What is said by hand: landmarks on the scan, shape components, joints: JSON, as in docs/edits.md
     #[arg(long, value_name = "FILE", requires = "scan", alias = "landmarks")]
     pub edits: Option<PathBuf>,
+    /// Settings of the stages; they win over those of SUBJECT/toile.toml
+    #[arg(long, value_name = "FILE")]
+    pub settings: Option<PathBuf>,
 }
 
 impl Person {
@@ -61,13 +68,18 @@ impl Person {
         match (&self.subject, &self.scan, &self.out) {
             (Some(subject), ..) => {
                 must_exist(subject)?;
-                let answer = reach(subject, Goal::Body, &Options::default(), session)?;
+                let answer = reach(
+                    subject,
+                    Goal::Body,
+                    &Options { settings: self.settings.clone(), ..Options::default() },
+                    session,
+                )?;
                 Ok((answer, Folders::new(subject).body()))
             }
             (None, Some(scan), Some(out)) => {
                 let mut edits = self.edits.as_deref().map(BodyEdits::read).transpose()?.unwrap_or_default();
                 edits.dressed |= self.dressed;
-                Ok((fit_scan(scan, out, edits, session)?, out.clone()))
+                Ok((fit_scan(scan, out, edits, self.settings.as_deref(), session)?, out.clone()))
             }
             _ => Err(StudioError::Usage("give a subject, or --scan MESH with --out DIR".into())),
         }
@@ -88,22 +100,28 @@ impl Fit {
 ///
 /// # Errors
 /// As [`Fit::run`].
-fn fit_scan(scan: &Path, out: &Path, edits: BodyEdits, session: &Session) -> Result<Answer, StudioError> {
+fn fit_scan(
+    scan: &Path,
+    out: &Path,
+    edits: BodyEdits,
+    settings_file: Option<&Path>,
+    session: &Session,
+) -> Result<Answer, StudioError> {
     must_exist(scan)?;
+    check_stage(out, &[&FILES[..], &["pose.json"]].concat(), scan)?;
     let name = scan.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let run = Run::single(scan.parent().unwrap_or(Path::new(".")), &name, session.progress.as_ref());
-    session.progress.plan(fit::COST);
-    let place = fit::Place {
-        scan: scan.to_path_buf(),
-        folder: out.to_path_buf(),
-        pose: out.join("pose.json"),
-        keep_frame: false,
-        edits,
-    };
-    let record = fit::fit(&run, &place, &BodyModel::load_default()?)?;
-    let files: Vec<PathBuf> = fit::FILES.iter().chain(&["pose.json"]).map(|f| out.join(f)).collect();
+    let run = Run::single(
+        scan.parent().unwrap_or(Path::new(".")),
+        &name,
+        settings::read(None, settings_file)?,
+        session.progress.as_ref(),
+    );
+    session.progress.plan(FitStep::SECONDS);
+    let model = BodyModel::load_default()?;
+    let record = run.step(&FitStep::of_scan(&run, &model, scan, out, &edits))?;
+    let files: Vec<String> = FILES.iter().chain(&["pose.json"]).map(|f| printable_path(&out.join(f))).collect();
     Ok(Answer {
-        text: files.iter().map(|f| format!("{}\n", f.display())).collect(),
+        text: files.iter().map(|f| format!("{f}\n")).collect(),
         results: json!({ "files": files, "fit": record.result }),
         warnings: record.warnings,
         ..Answer::default()

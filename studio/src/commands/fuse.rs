@@ -4,13 +4,17 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use serde_json::json;
-use toile_capture::{CaptureError, trajectory};
+use toile_capture::{CaptureError, printable_path, trajectory};
 use toile_fusion::{FusionSettings, KnownPose, Prior, Volume};
-use toile_pipeline::{Goal, Observer, Options, Run, steps::fuse};
+use toile_pipeline::{FusionChoice, Goal, Observer, Options, Run, Step, settings, steps::fuse::Fuse as FuseStep};
 
 use crate::{
     StudioError,
-    commands::reach::{is_subject, must_exist, reach},
+    commands::{
+        output::check_stage,
+        prior::PriorChoice,
+        reach::{is_subject, must_exist, reach},
+    },
     outcome::Answer,
     session::Session,
 };
@@ -33,21 +37,24 @@ pub struct Fuse {
     /// Folder of the result, for a recording or a folder (default: NAME-scan in the current folder)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// auto: the person who turns, without floor, disk and wall; all: everything that was seen
-    #[arg(long, value_enum, default_value_t = VolumeChoice::Auto)]
-    volume: VolumeChoice,
-    /// turntable: the person turns evenly before a resting camera; none: a camera held by hand
-    #[arg(long, value_enum, default_value_t = PriorChoice::Turntable)]
-    prior: PriorChoice,
+    /// auto (usual): the person who turns, without floor, disk and wall; all: everything that was seen
+    #[arg(long, value_enum)]
+    volume: Option<VolumeChoice>,
+    /// turntable (usual): the person turns evenly before a resting camera; none: a camera held by hand
+    #[arg(long, value_enum)]
+    prior: Option<PriorChoice>,
     /// Known poses instead of tracking: TUM lines `t tx ty tz qx qy qz qw`, t = device time in seconds
     #[arg(long, value_name = "FILE")]
     poses: Option<PathBuf>,
-    /// Size of a voxel, millimetres
-    #[arg(long, value_name = "MM", default_value_t = 1e3 * FusionSettings::default().voxel_size)]
-    voxel: f64,
-    /// Truncation of the signed distances, millimetres (default: four voxels); noisy depth widens it
+    /// Size of a voxel, millimetres (usually 4)
+    #[arg(long, value_name = "MM")]
+    voxel: Option<f64>,
+    /// Truncation of the signed distances, millimetres (usually four voxels); noisy depth widens it
     #[arg(long, value_name = "MM")]
     truncation: Option<f64>,
+    /// Settings of the stages; they win over those of SUBJECT/toile.toml
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -56,10 +63,13 @@ enum VolumeChoice {
     All,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum PriorChoice {
-    Turntable,
-    None,
+impl From<VolumeChoice> for Volume {
+    fn from(choice: VolumeChoice) -> Self {
+        match choice {
+            VolumeChoice::Auto => Self::Auto,
+            VolumeChoice::All => Self::All,
+        }
+    }
 }
 
 impl Fuse {
@@ -69,7 +79,7 @@ impl Fuse {
     /// [`StudioError`] where nothing can be fused or written.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         must_exist(&self.path)?;
-        let settings = self.settings()?;
+        let fusion = self.choice()?;
         if is_subject(&self.path) {
             if self.out.is_some() {
                 return Err(StudioError::Usage("--out is for recordings and folders; a subject has its build/".into()));
@@ -77,47 +87,44 @@ impl Fuse {
             if self.poses.is_some() {
                 return Err(StudioError::Usage("--poses are those of one take; give its recording".into()));
             }
-            return reach(&self.path, Goal::Scans, &Options { fusion: settings, ..Options::default() }, session);
+            let options = Options { fusion, settings: self.settings.clone(), ..Options::default() };
+            return reach(&self.path, Goal::Scans, &options, session);
         }
-        self.fuse_single(&settings, session)
+        self.fuse_single(&fusion, session)
     }
 
-    fn settings(&self) -> Result<FusionSettings, StudioError> {
-        if !(0.5..=50.0).contains(&self.voxel) {
-            return Err(StudioError::Usage(format!("--voxel {} is not between 0.5 and 50 mm", self.voxel)));
+    fn choice(&self) -> Result<FusionChoice, StudioError> {
+        if let Some(voxel) = self.voxel.filter(|mm| !(0.5..=50.0).contains(mm)) {
+            return Err(StudioError::Usage(format!("--voxel {voxel} is not between 0.5 and 50 mm")));
         }
-        let defaults = FusionSettings::default();
-        let truncation = self.truncation.unwrap_or(self.voxel * defaults.truncation / defaults.voxel_size);
-        if !(2.0 * self.voxel..1000.0).contains(&truncation) {
+        let voxel = self.voxel.unwrap_or(1e3 * FusionSettings::default().voxel_size);
+        if let Some(truncation) = self.truncation.filter(|mm| !(2.0 * voxel..1000.0).contains(mm)) {
             let reason = format!("--truncation {truncation} is not between two voxels and 1000 mm");
             return Err(StudioError::Usage(reason));
         }
-        Ok(FusionSettings {
-            volume: match self.volume {
-                VolumeChoice::Auto => Volume::Auto,
-                VolumeChoice::All => Volume::All,
-            },
-            prior: match self.prior {
-                PriorChoice::Turntable => Prior::Turntable,
-                PriorChoice::None => Prior::None,
-            },
+        Ok(FusionChoice {
+            volume: self.volume.map(Volume::from),
+            prior: self.prior.map(Prior::from),
             poses: self.poses.as_deref().map(known_poses).transpose()?,
-            truncation: truncation * 1e-3,
-            voxel_size: self.voxel * 1e-3,
-            ..defaults
+            truncation: self.truncation.map(|mm| mm * 1e-3),
+            voxel_size: self.voxel.map(|mm| mm * 1e-3),
         })
     }
 
-    fn fuse_single(&self, settings: &FusionSettings, session: &Session) -> Result<Answer, StudioError> {
+    fn fuse_single(&self, fusion: &FusionChoice, session: &Session) -> Result<Answer, StudioError> {
         let name = self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{name}-scan")));
         let root = self.path.parent().unwrap_or(Path::new("."));
-        let run = Run::single(root, &name, session.progress.as_ref());
-        session.progress.plan(fuse::COST);
-        let record = fuse::fuse_recording(&run, &self.path, &out, &name, settings)?;
-        let files = ["scan.ply", "trajectory.tum", "report.json", "timings.json"].map(|f| out.join(f));
+        check_stage(&out, &["scan.ply", "trajectory.tum"], &self.path)?;
+        let settings = settings::read(None, self.settings.as_deref())?;
+        let run = Run::single(root, &name, settings, session.progress.as_ref());
+        session.progress.plan(FuseStep::SECONDS);
+        let settings = fusion.over(&run.settings.fusion);
+        let (recording, folder) = (self.path.clone(), out.clone());
+        let record = run.step(&FuseStep { run: &run, recording, folder, name, settings: &settings })?;
+        let files = ["scan.ply", "trajectory.tum", "report.json", "timings.json"].map(|f| printable_path(&out.join(f)));
         Ok(Answer {
-            text: format!("{}\n", files[0].display()),
+            text: format!("{}\n", files[0]),
             results: json!({ "files": files, "fusion": record.result }),
             warnings: record.warnings,
             lost: record.lost,

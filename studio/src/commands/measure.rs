@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use serde_json::json;
+use toile_capture::printable_path;
 use toile_fitting::MeasureTable;
-use toile_pipeline::body_file::read_json;
+use toile_pipeline::json::read;
 
 use crate::{StudioError, commands::fit::Person, outcome::Answer, session::Session};
 
@@ -38,13 +39,13 @@ impl Measure {
 
 /// What a fit said, with the table that it wrote into `folder`.
 fn measured(fitted: Answer, folder: &Path) -> Result<Answer, StudioError> {
-    let table: MeasureTable = read_json(&folder.join("measurements.json"))?;
+    let table: MeasureTable = read(&folder.join("measurements.json"))?;
     let width = table.measures.iter().map(|m| m.name.len()).max().unwrap_or(0);
     let mut text: String =
         table.measures.iter().map(|m| format!("{:width$}  {:6.1} cm\n", m.name, 100.0 * m.value_m)).collect();
     text += &format!("{:width$}  {:6.1} l\n", "volume", table.volume_l);
-    let files = ["measurements.json", "measurements.csv"].map(|f| folder.join(f));
-    text.extend(files.iter().map(|f| format!("{}\n", f.display())));
+    let files = ["measurements.json", "measurements.csv"].map(|f| printable_path(&folder.join(f)));
+    text.extend(files.iter().map(|f| format!("{f}\n")));
     let values: serde_json::Map<_, _> = table.measures.iter().map(|m| (m.name.clone(), json!(m.value_m))).collect();
     let results = json!({ "measurements_m": values, "volume_l": table.volume_l, "files": files });
     Ok(Answer { text, results, ..fitted })

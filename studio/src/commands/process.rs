@@ -8,9 +8,15 @@ use std::{
 };
 
 use serde_json::{Value, json};
-use toile_pipeline::{Goal, Options, Summary, process as process_subject};
+use toile_capture::printable_path;
+use toile_pipeline::{FusionChoice, Goal, Options, Summary, process as process_subject};
 
-use crate::{StudioError, outcome::Answer, session::Session};
+use crate::{
+    StudioError,
+    commands::{prior::PriorChoice, reach::motion_choice},
+    outcome::{Answer, error_document},
+    session::Session,
+};
 
 const AFTER: &str = "\
 What is up to date is not done again; a run that was interrupted goes on where it was.
@@ -28,9 +34,15 @@ pub struct Process {
     /// Subject folders
     #[arg(required = true, value_name = "SUBJECT")]
     subjects: Vec<PathBuf>,
-    /// BVH motion for the avatar (without: a walk that ships with Toile)
+    /// BVH motion for the avatar, or `walk` for the one that ships with Toile (without: as the avatar was made last)
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
+    /// turntable (usual): the person turns evenly before a resting camera; none: a camera held by hand
+    #[arg(long, value_enum)]
+    prior: Option<PriorChoice>,
+    /// Settings of the stages; they win over those of SUBJECT/toile.toml
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
 }
 
 impl Process {
@@ -39,7 +51,13 @@ impl Process {
     /// # Errors
     /// [`StudioError`] where the motion cannot be read; a subject that fails is told in the answer.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
-        process(&self.subjects, &Options { motion: self.motion.clone(), ..Options::default() }, session)
+        let options = Options {
+            motion: motion_choice(self.motion.as_deref()),
+            fusion: FusionChoice { prior: self.prior.map(Into::into), ..FusionChoice::default() },
+            settings: self.settings.clone(),
+            ..Options::default()
+        };
+        process(&self.subjects, &options, session)
     }
 }
 
@@ -57,7 +75,7 @@ pub fn process(subjects: &[PathBuf], options: &Options, session: &Session) -> Re
             process_subject(subject, Goal::Report, options, session.progress.as_ref()).map_err(StudioError::from)
         });
         let seconds = started.elapsed().as_secs_f64();
-        let name = subject.display().to_string();
+        let name = printable_path(subject);
         match done {
             Ok(summary) => {
                 rows.push(row(&name, &summary, seconds));
@@ -66,8 +84,8 @@ pub fn process(subjects: &[PathBuf], options: &Options, session: &Session) -> Re
             }
             Err(error) => {
                 rows.push([name.clone(), "failed".into(), "-".into(), "-".into(), format!("{seconds:.1}")]);
-                let told = json!({ "kind": error.kind(), "message": error.to_string() });
-                results.push(json!({ "subject": name, "outcome": "failed", "error": told, "seconds": seconds }));
+                let error_told = error_document(&error);
+                results.push(json!({ "subject": name, "outcome": "failed", "error": error_told, "seconds": seconds }));
                 answer.failures.push(prefixed(subjects.len(), &name, &error.to_string()));
             }
         }
@@ -76,7 +94,7 @@ pub fn process(subjects: &[PathBuf], options: &Options, session: &Session) -> Re
     if let [only] = subjects
         && answer.failures.is_empty()
     {
-        let at = |file: &str| only.join(file).display().to_string();
+        let at = |file: &str| printable_path(&only.join(file));
         answer.text.push_str(&format!("\nlook at {} and {}\n", at("report.html"), at("avatar.glb")));
     }
     answer.results = Value::Array(results);
@@ -91,15 +109,16 @@ fn guarded<T>(subject: &Path, work: impl FnOnce() -> Result<T, StudioError>) -> 
     };
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let reason = format!("a mistake inside Toile ({}); please report it", said(panic));
-        Err(StudioError::stage(subject, reason))
+        Err(StudioError::refused(subject, reason))
     })
 }
 
 fn collect(answer: &mut Answer, subjects: usize, name: &str, summary: Summary) {
     let all = |sentences: Vec<String>| sentences.into_iter().map(|s| prefixed(subjects, name, &s)).collect::<Vec<_>>();
-    answer.warnings.extend(all(summary.warnings));
-    answer.lost.extend(all(summary.lost));
-    answer.failures.extend(all(summary.failures));
+    answer.warnings.extend(all(summary.remarks.warnings));
+    answer.warnings.extend(all(summary.notes));
+    answer.lost.extend(all(summary.remarks.lost));
+    answer.failures.extend(all(summary.remarks.failures));
 }
 
 fn prefixed(subjects: usize, name: &str, sentence: &str) -> String {
@@ -107,7 +126,7 @@ fn prefixed(subjects: usize, name: &str, sentence: &str) -> String {
 }
 
 fn outcome(summary: &Summary) -> &'static str {
-    match (summary.failures.is_empty(), summary.lost.is_empty()) {
+    match (summary.remarks.failures.is_empty(), summary.remarks.lost.is_empty()) {
         (false, _) => "failed",
         (true, false) => "lost",
         (true, true) => "done",
@@ -121,7 +140,13 @@ fn row(name: &str, summary: &Summary, seconds: f64) -> [String; 5] {
         done => done,
     };
     let count = |n: usize| n.to_string();
-    [name.into(), result.into(), count(summary.layers.len()), count(summary.warnings.len()), format!("{seconds:.1}")]
+    [
+        name.into(),
+        result.into(),
+        count(summary.layers.len()),
+        count(summary.remarks.warnings.len()),
+        format!("{seconds:.1}"),
+    ]
 }
 
 fn result(name: &str, summary: &Summary, seconds: f64) -> Value {
@@ -130,10 +155,10 @@ fn result(name: &str, summary: &Summary, seconds: f64) -> Value {
         "outcome": outcome(summary),
         "layers": summary.layers,
         "measurements": summary.measurements,
-        "files": summary.files,
-        "warnings": summary.warnings,
-        "lost": summary.lost,
-        "failures": summary.failures,
+        "files": summary.files.iter().map(|f| printable_path(f)).collect::<Vec<_>>(),
+        "warnings": summary.remarks.warnings,
+        "lost": summary.remarks.lost,
+        "failures": summary.remarks.failures,
         "seconds": seconds,
     })
 }

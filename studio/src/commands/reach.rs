@@ -3,24 +3,27 @@
 use std::path::Path;
 
 use serde_json::json;
-
-use toile_pipeline::{Goal, Options, Summary, process};
+use toile_capture::printable_path;
+use toile_pipeline::{Goal, MotionChoice, Options, Remarks, Summary, process};
 
 use crate::{StudioError, outcome::Answer, session::Session};
 
 /// Takes one subject to a goal and tells which files there are now.
 pub(super) fn reach(subject: &Path, goal: Goal, options: &Options, session: &Session) -> Result<Answer, StudioError> {
     let summary = process(subject, goal, options, session.progress.as_ref())?;
-    let text = summary.files.iter().map(|f| format!("{f}\n")).collect();
-    Ok(answer(summary, text))
+    let text = summary.files.iter().map(|f| format!("{}\n", printable_path(f))).collect();
+    answer(summary, text)
 }
 
 /// What a summary is to people and machines.
-pub(super) fn answer(summary: Summary, text: String) -> Answer {
-    let stages: serde_json::Map<_, _> = summary.stages.iter().map(|(k, r)| (k.clone(), r.result.clone())).collect();
-    let Summary { layers, measurements, files, warnings, lost, failures, .. } = summary;
+fn answer(summary: Summary, text: String) -> Result<Answer, StudioError> {
+    let Summary { layers, measurements, files, decided, remarks, notes } = summary;
+    let files: Vec<String> = files.iter().map(|f| printable_path(f)).collect();
+    let stages = decided.by_step()?;
     let results = json!({ "layers": layers, "measurements": measurements, "files": files, "stages": stages });
-    Answer { text, results, warnings, lost, failures }
+    let Remarks { mut warnings, lost, failures } = remarks;
+    warnings.extend(notes);
+    Ok(Answer { text, results, warnings, lost, failures })
 }
 
 /// Fails with a sentence where there is nothing at `path`.
@@ -31,4 +34,14 @@ pub(super) fn must_exist(path: &Path) -> Result<(), StudioError> {
 /// True where `path` is the folder of a subject.
 pub(super) fn is_subject(path: &Path) -> bool {
     path.join("subject.toml").is_file()
+}
+
+/// How the avatar moves: a file, `walk` for the shipped walk, or as before where nothing is said.
+pub(super) fn motion_choice(motion: Option<&Path>) -> MotionChoice {
+    match motion {
+        None => MotionChoice::AsBefore,
+        // A file of that name without an extension is no motion that anybody writes.
+        Some(path) if path == Path::new("walk") => MotionChoice::Walk,
+        Some(path) => MotionChoice::File(path.to_path_buf()),
+    }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use serde_json::json;
-use toile_capture::atomic_write;
+use toile_capture::{atomic_write, printable_path};
 use toile_character::BodyModel;
 use toile_fitting::measure_table;
 use toile_pipeline::Observer;
@@ -89,7 +89,10 @@ impl Synthesize {
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         let settings = self.settings()?;
         if self.out.exists() {
-            return Err(StudioError::Usage(format!("{} exists already; choose another --out", self.out.display())));
+            return Err(StudioError::Usage(format!(
+                "{} exists already; choose another --out",
+                printable_path(&self.out)
+            )));
         }
         let wrong = |e| failed(&self.out, e);
         let progress = &session.progress;
@@ -111,18 +114,25 @@ impl Synthesize {
         atomic_write(&truth.join("measurements.json"), &measured).map_err(|e| failed(&self.out, e.into()))?;
         progress.end();
         let text = match self.kind {
-            Kind::Subject => format!("{0}: now `toile process {0}`; the truth is in {0}/truth\n", self.out.display()),
-            Kind::Folders => format!("{}: folders to import, with truth/ in each\n", self.out.display()),
+            Kind::Subject => {
+                format!("{0}: now `toile process {0}`; the truth is in {0}/truth\n", printable_path(&self.out))
+            }
+            Kind::Folders => format!("{}: folders to import, with truth/ in each\n", printable_path(&self.out)),
         };
-        Ok(Answer { text, results: json!({ "out": self.out, "settings": settings }), ..Answer::default() })
+        Ok(Answer {
+            text,
+            results: json!({ "out": printable_path(&self.out), "settings": settings }),
+            ..Answer::default()
+        })
     }
 
     /// The true measurements, as in a processed subject's `measurements.json`; the true stature is entered into the subject.
     fn measured(&self, subject: &mut Subject) -> Result<Vec<u8>, StudioError> {
-        let model = BodyModel::load_default().map_err(|e| StudioError::stage(&self.out, e))?;
-        let table = measure_table(&model, &subject.person.body).map_err(|e| StudioError::stage(&self.out, e))?;
+        let model = BodyModel::load_default()?;
+        let table =
+            measure_table(&model, &subject.person.body).map_err(|e| StudioError::refused(&self.out, e.to_string()))?;
         subject.person.stature_m = table.value("stature").unwrap_or(subject.person.stature_m);
-        serde_json::to_vec_pretty(&table).map_err(|e| StudioError::stage(&self.out, e))
+        serde_json::to_vec_pretty(&table).map_err(|e| StudioError::refused(&self.out, e.to_string()))
     }
 
     fn settings(&self) -> Result<SyntheticSettings, StudioError> {
@@ -165,6 +175,6 @@ impl Synthesize {
 fn failed(out: &Path, error: SyntheticError) -> StudioError {
     match error {
         SyntheticError::Capture(error) => error.into(),
-        other => StudioError::stage(out, other),
+        other => StudioError::refused(out, other.to_string()),
     }
 }

@@ -63,6 +63,7 @@ const TABLE: &[Row] = &[
     ),
     // The program and the end-to-end tests bring everything together.
     row("studio", ALL, ALL),
+    row("outside", &[], &[]),
     row("tests", ALL, ALL),
 ];
 

@@ -1,0 +1,121 @@
+//! What a subject's avatar was made with: kept in `SUBJECT/edits/avatar.json`, with its motion beside, so that the next
+//! run makes the same one.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use toile_capture::files::{atomic_write, read_bytes};
+use toile_character::JointNaming;
+use toile_garments::CullSettings;
+
+use crate::{
+    PipelineError,
+    folders::Folders,
+    json, motion,
+    options::{HiddenChoice, MotionChoice, Options},
+};
+
+/// What an avatar is made with. The default is the shipped walk, VRM's joint names, and whole layers.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AvatarChoice {
+    /// File name of the motion in `SUBJECT/edits/motion/`; without, the shipped walk.
+    pub motion: Option<String>,
+    /// What the joints are called in `avatar.glb`.
+    pub joint_names: JointNaming,
+    /// How what clothes hide is left out; without, nothing is.
+    pub hidden: Option<CullSettings>,
+}
+
+impl AvatarChoice {
+    /// What the avatar at `folders` was made with last.
+    ///
+    /// # Errors
+    /// [`PipelineError`] where the file cannot be read.
+    pub fn read(folders: &Folders) -> Result<Self, PipelineError> {
+        let path = folders.avatar_choice();
+        if path.exists() { json::read(&path) } else { Ok(Self::default()) }
+    }
+
+    /// What it is made with now: as before where `options` say nothing. A motion is copied into the subject's folder.
+    ///
+    /// # Errors
+    /// [`PipelineError`] where a file cannot be read or written.
+    pub fn choose(folders: &Folders, options: &Options) -> Result<Self, PipelineError> {
+        let before = Self::read(folders)?;
+        let mut choice = before.clone();
+        match &options.motion {
+            MotionChoice::AsBefore => {}
+            MotionChoice::Walk => choice.motion = None,
+            MotionChoice::File(path) => choice.motion = Some(keep(folders, path)?),
+        }
+        match &options.hidden {
+            HiddenChoice::AsBefore => {}
+            HiddenChoice::Whole => choice.hidden = None,
+            HiddenChoice::LeftOut(settings) => choice.hidden = Some(settings.clone()),
+        }
+        choice.joint_names = options.joint_names.unwrap_or(choice.joint_names);
+        if choice != before {
+            atomic_write(&folders.avatar_choice(), &json::pretty(&choice)?)?;
+        }
+        Ok(choice)
+    }
+
+    /// The file of the motion; `None` for the shipped walk.
+    pub fn motion_path(&self, folders: &Folders) -> Option<PathBuf> {
+        self.motion.as_ref().map(|name| folders.motions().join(name))
+    }
+
+    /// What differs from an avatar that nobody chose anything for, in words.
+    pub fn in_words(&self) -> Vec<String> {
+        let motion = self
+            .motion
+            .as_ref()
+            .map(|name| format!("the motion {name} (--motion {} for the shipped one)", motion::WALK));
+        let hidden =
+            self.hidden.as_ref().map(|_| "nothing that clothes hide (`toile export` alone makes it whole)".to_string());
+        let is_vrm = self.joint_names == JointNaming::Vrm;
+        let names =
+            (!is_vrm).then(|| "joint names of another system (--joint-names vrm for the usual ones)".to_string());
+        [motion, hidden, names].into_iter().flatten().collect()
+    }
+}
+
+/// Copies a motion into the subject's folder and gives its name there.
+fn keep(folders: &Folders, path: &Path) -> Result<String, PipelineError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let kept = folders.motions().join(&name);
+    let bytes = read_bytes(path)?;
+    if fs::read(&kept).is_ok_and(|old| old == bytes) {
+        return Ok(name);
+    }
+    atomic_write(&kept, &bytes)?;
+    Ok(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_choice_is_kept_until_another_one_is_made() {
+        let dir = tempfile::tempdir().unwrap();
+        let (folders, bvh) = (Folders::new(&dir.path().join("anna")), dir.path().join("dance.bvh"));
+        fs::write(&bvh, "HIERARCHY").unwrap();
+        let with = |options: Options| AvatarChoice::choose(&folders, &options).unwrap();
+        assert_eq!(with(Options::default()), AvatarChoice::default());
+        assert!(!folders.avatar_choice().exists(), "nothing was chosen");
+        let hidden = HiddenChoice::LeftOut(CullSettings::default());
+        let chosen = with(Options { motion: MotionChoice::File(bvh), hidden, ..Options::default() });
+        assert_eq!(fs::read_to_string(chosen.motion_path(&folders).unwrap()).unwrap(), "HIERARCHY");
+        assert_eq!(with(Options::default()), chosen);
+        assert_eq!(chosen.in_words().len(), 2);
+        let walks = with(Options { motion: MotionChoice::Walk, ..Options::default() });
+        assert_eq!((walks.motion, walks.hidden), (None, chosen.hidden));
+        with(Options { hidden: HiddenChoice::Whole, ..Options::default() });
+        assert_eq!(AvatarChoice::read(&folders).unwrap(), AvatarChoice::default());
+    }
+}

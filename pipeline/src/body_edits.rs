@@ -1,0 +1,62 @@
+//! What is said by hand about the body: the content of `SUBJECT/edits/body.json`.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use toile_character::JointRegressor;
+use toile_fitting::{FitSettings, HandLandmarks};
+
+use crate::{PipelineError, json};
+
+/// What is said by hand about the body.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyEdits {
+    /// 1.
+    #[serde(rename = "version")]
+    _version: Version,
+    /// There is no undressed take: the first one shows the person dressed, and the body is estimated.
+    #[serde(default)]
+    pub dressed: bool,
+    /// Landmarks by the template's names: metres, in the frame of the first take's scan.
+    #[serde(default)]
+    pub landmarks: HandLandmarks,
+    /// Shape components used; without, those of the settings.
+    #[serde(default)]
+    pub components: Option<usize>,
+    /// How joints follow the shape; without, as the settings say.
+    #[serde(default)]
+    pub joints: Option<JointRegressor>,
+}
+
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(try_from = "u32")]
+struct Version;
+
+impl TryFrom<u32> for Version {
+    type Error = String;
+
+    fn try_from(version: u32) -> Result<Self, String> {
+        if version == 1 { Ok(Self) } else { Err(format!("version {version}, but this program reads version 1")) }
+    }
+}
+
+impl BodyEdits {
+    /// Reads a file of edits.
+    ///
+    /// # Errors
+    /// [`PipelineError::Format`] with the field that is wrong.
+    pub fn read(path: &Path) -> Result<Self, PipelineError> {
+        json::read(path)
+    }
+
+    /// The settings of the fit, with what was said by hand.
+    pub fn over(&self, settings: &FitSettings) -> FitSettings {
+        let mut settings = settings.clone();
+        settings.dressed |= self.dressed;
+        settings.landmarks.extend(self.landmarks.clone());
+        settings.components = self.components.unwrap_or(settings.components);
+        settings.joints = self.joints.unwrap_or(settings.joints);
+        settings
+    }
+}

@@ -1,0 +1,99 @@
+//! `report.json`: what the steps that worked in a folder decided.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::Value;
+use toile_capture::files::atomic_write;
+
+use crate::{PipelineError, hash, json};
+
+/// What `report.json` says of one step, with the typed report `R`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Record<R> {
+    /// Version of the step.
+    pub version: u32,
+    /// Hash of program, step, version, inputs and settings.
+    pub hash: String,
+    /// SHA-256 of every input by its path.
+    pub inputs: BTreeMap<String, String>,
+    /// The resolved settings.
+    pub settings: Value,
+    /// SHA-256 of every output by its path.
+    pub outputs: BTreeMap<String, String>,
+    /// What was decided.
+    pub result: R,
+    /// What to worry about.
+    pub warnings: Vec<String>,
+    /// Recorded data that was lost.
+    pub lost: Vec<String>,
+    /// What failed although the run went on.
+    pub failures: Vec<String>,
+}
+
+/// A step's part of the file: its record, and a hash of that, so that a change by hand is noticed.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct Sealed {
+    #[serde(flatten)]
+    record: Value,
+    /// SHA-256 of the record; a record without one is of an earlier version.
+    seal: Option<String>,
+}
+
+/// The file: every step that worked in the folder.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct ReportFile {
+    program: String,
+    stages: BTreeMap<String, Sealed>,
+}
+
+/// Where the records of a folder are.
+pub fn report_path(folder: &Path) -> PathBuf {
+    folder.join("report.json")
+}
+
+/// The record of the step called `step` in `folder`; `None` where it never worked there.
+///
+/// # Errors
+/// [`PipelineError::Format`] that names file and field where the file is damaged, was changed since it was written, or
+/// is of another version of the program.
+pub fn read<R: DeserializeOwned>(folder: &Path, step: &str) -> Result<Option<Record<R>>, PipelineError> {
+    let path = report_path(folder);
+    let sealed = read_file(&path)?.stages.remove(step);
+    let Some(Sealed { record, seal: Some(seal) }) = sealed else { return Ok(None) };
+    if seal_of(&record) != seal {
+        return Err(PipelineError::field(&path, &format!("stages.{step}"), "was changed since it was written"));
+    }
+    json::from_value(&path, &format!("stages.{step}"), record).map(Some)
+}
+
+/// Puts the record of `step` into the file of `folder`, beside those of other steps.
+///
+/// # Errors
+/// [`PipelineError`] where it cannot be written, or would not be read back as it is.
+pub fn write<R: Serialize + DeserializeOwned>(
+    folder: &Path,
+    program: &str,
+    step: &str,
+    record: &Record<R>,
+) -> Result<(), PipelineError> {
+    let path = report_path(folder);
+    let record = json::plain(record)?;
+    json::from_value::<Record<R>>(&path, &format!("stages.{step}"), record.clone())?;
+    // What cannot be read any more is built again by its own steps.
+    let mut file = read_file(&path).unwrap_or_default();
+    file.program = program.into();
+    file.stages.insert(step.into(), Sealed { seal: Some(seal_of(&record)), record });
+    Ok(atomic_write(&path, &json::pretty(&file)?)?)
+}
+
+fn read_file(path: &Path) -> Result<ReportFile, PipelineError> {
+    if path.exists() { json::read(path) } else { Ok(ReportFile::default()) }
+}
+
+fn seal_of(record: &Value) -> String {
+    hash::bytes(record.to_string().as_bytes())
+}

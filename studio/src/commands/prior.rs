@@ -1,0 +1,21 @@
+//! `--prior`: what is assumed about the motion between frames.
+
+use toile_fusion::Prior;
+
+/// What is assumed about the motion between frames.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+pub enum PriorChoice {
+    /// The person turns evenly before a resting camera.
+    Turntable,
+    /// A camera held by hand.
+    None,
+}
+
+impl From<PriorChoice> for Prior {
+    fn from(choice: PriorChoice) -> Self {
+        match choice {
+            PriorChoice::Turntable => Self::Turntable,
+            PriorChoice::None => Self::None,
+        }
+    }
+}
