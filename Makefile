@@ -38,3 +38,6 @@ bench: setup ## Run the benchmarks
 
 peers: build ## Compare fusion with Open3D and small_gicp (from PyPI) on the same frames; FRAMES=folder for other frames
 	python3 tests/peers/fusion.py $(FRAMES)
+
+fuzz: setup ## Fuzz all parsers of outside data for 10 minutes in all; SECONDS=n for another time
+	bash fuzz/run.sh $(SECONDS)

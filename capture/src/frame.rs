@@ -2,37 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::CaptureError;
-
-/// A depth image in the sensor's units; 0 where nothing was measured.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct DepthImage {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Row by row; metres are `value * Sensor::depth_scale`.
-    pub values: Vec<u16>,
-}
-
-impl DepthImage {
-    /// Value at column `u`, row `v`; 0 outside.
-    #[inline]
-    pub fn at(&self, u: u32, v: u32) -> u16 {
-        if u < self.width && v < self.height { self.values[(v * self.width + u) as usize] } else { 0 }
-    }
-}
-
-/// An 8-bit sRGB image, row by row.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RgbImage {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Pixels, row by row.
-    pub pixels: Vec<[u8; 3]>,
-}
+use crate::{
+    CaptureError, encoded,
+    picture::{DepthImage, RgbImage},
+};
 
 /// A colour image as the device gave it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,37 +40,36 @@ pub struct Frame {
 }
 
 impl ColorImage {
-    /// Decodes to pixels.
+    /// Decodes to pixels. Of a JPEG that is damaged behind its header, the part that can be read is given.
     ///
     /// # Errors
-    /// [`CaptureError::Frame`] (with `index`) where the bytes are no such image.
+    /// [`CaptureError::Frame`] (with `index`) where the bytes are not such an image.
     pub fn decode(&self, index: u64) -> Result<Arc<RgbImage>, CaptureError> {
-        let wrong = |reason: String| CaptureError::Frame { index, reason };
+        let wrong = |reason: String| CaptureError::Frame { index, reason: format!("the colour image {reason}") };
         match self {
             Self::Rgb(image) => Ok(image.clone()),
-            Self::Jpeg(bytes) => decode_jpeg(bytes).map(Arc::new).map_err(wrong),
-            Self::Png(bytes) => decode_png(bytes).map(Arc::new).map_err(wrong),
+            Self::Jpeg(bytes) => encoded::decode_jpeg(bytes, false).map(Arc::new).map_err(wrong),
+            Self::Png(bytes) => encoded::decode_color_png(bytes).map(Arc::new).map_err(wrong),
         }
+    }
+
+    /// Decodes the whole image to see whether it is whole; gives its columns and rows.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub(crate) fn check(&self) -> Result<(u32, u32), String> {
+        let image = match self {
+            Self::Rgb(image) => return Ok((image.width, image.height)),
+            Self::Jpeg(bytes) => encoded::decode_jpeg(bytes, true)?,
+            Self::Png(bytes) => encoded::decode_color_png(bytes)?,
+        };
+        Ok((image.width, image.height))
     }
 }
 
-fn decode_jpeg(bytes: &[u8]) -> Result<RgbImage, String> {
-    use zune_jpeg::{JpegDecoder, zune_core::bytestream::ZCursor};
-    let mut decoder = JpegDecoder::new(ZCursor::new(bytes));
-    let flat = decoder.decode().map_err(|e| format!("the colour image is no readable JPEG: {e}"))?;
-    let (width, height) = decoder.dimensions().ok_or("the JPEG has no size")?;
-    let count = width * height;
-    let pixels = match flat.len() {
-        n if n == count * 3 => flat.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
-        n if n == count => flat.iter().map(|&g| [g; 3]).collect(),
-        n => return Err(format!("the JPEG has {n} bytes for {count} pixels")),
-    };
-    Ok(RgbImage { width: width as u32, height: height as u32, pixels })
-}
-
-fn decode_png(bytes: &[u8]) -> Result<RgbImage, String> {
-    let image = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
-        .map_err(|e| format!("the colour image is no readable PNG: {e}"))?
-        .to_rgb8();
-    Ok(RgbImage { width: image.width(), height: image.height(), pixels: image.pixels().map(|p| p.0).collect() })
+/// An image from `rgb8` bytes; `None` where their number does not fit.
+pub(crate) fn rgb_image(width: u32, height: u32, bytes: &[u8]) -> Option<ColorImage> {
+    let (pixels, rest) = bytes.as_chunks::<3>();
+    let fits = rest.is_empty() && pixels.len() as u64 == u64::from(width) * u64::from(height);
+    fits.then(|| ColorImage::Rgb(Arc::new(RgbImage { width, height, pixels: pixels.to_vec() })))
 }

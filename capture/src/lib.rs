@@ -2,9 +2,9 @@
 //!
 //! - [`Frame`]: depth and colour of one sensor at one time, with device and host time and the device's frame number;
 //! - [`Rig`] and [`Sensor`]: cameras, calibration, identity;
-//! - [`clock`]: which clock stamps frames, and its fit to the host's;
-//! - [`tick_clock`]: a device's ticks, which wrap, as a time that does not;
-//! - [`pairing`]: depth and colour of one time to one frame, for devices that send them apart;
+//! - [`ClockDomain`], [`ClockFit`]: which clock stamps frames, and its fit to the host's;
+//! - [`TickClock`]: a device's ticks, which wrap, as a time that does not;
+//! - [`pairing`]: depth and colour of one time made one frame, for devices that send them apart;
 //! - [`pixels`]: what cameras send to images: depth, grey, YUYV, JPEG markers;
 //! - [`Source`]: what live devices, replay and the synthetic sensor have in common;
 //! - [`Recorder`] writes frames to an MCAP file, [`Replay`] is the file as a source; [`depth_codec`] packs depth;
@@ -49,36 +49,37 @@
 //! # }
 //! ```
 
-pub mod clock;
-mod container;
-pub mod depth_codec;
-pub mod error;
+mod associate;
+mod clock;
+mod encoded;
+mod error;
 pub mod files;
-pub mod frame;
+mod frame;
+#[doc(hidden)]
+pub mod fuzzing;
 pub mod import;
 pub mod inspect;
-mod message;
 pub mod pairing;
+mod picture;
 pub mod pixels;
 mod printable;
-mod protobuf;
 pub mod recording;
-pub mod replay;
-pub mod rig;
-mod schema;
-pub mod source;
+mod rig;
+mod source;
 pub mod subject;
-pub mod tick_clock;
+mod tick_clock;
 pub mod trajectory;
 
 pub use clock::{ClockDomain, ClockFit, host_now_ns};
 pub use error::CaptureError;
 pub use files::{atomic_write, atomic_write_all, atomic_write_with};
-pub use frame::{ColorImage, DepthImage, Frame, RgbImage};
+pub use frame::{ColorImage, Frame};
 pub use inspect::{Inspection, inspect};
+pub use picture::{DepthImage, RgbImage};
 pub use printable::{printable, printable_lines, printable_path};
-pub use recording::{DepthEncoding, Recorder, RecorderOptions, RecordingSummary, export_standard};
-pub use replay::{FrameInfo, Loss, Replay};
+pub use recording::{
+    DepthEncoding, FrameInfo, Loss, Recorder, RecorderOptions, RecordingSummary, Replay, depth_codec, export_standard,
+};
 pub use rig::{DeviceIdentity, Rig, Sensor};
 pub use source::Source;
 pub use subject::{Layer, LockedSubject, PendingTake, Subject, SubjectLock};

@@ -1,4 +1,4 @@
-//! Depth and colour of one time to one pair. Nothing is dropped: what finds no partner goes on alone.
+//! Depth and colour of one time made one pair. Nothing is dropped: an image without a partner goes on alone.
 
 use std::collections::VecDeque;
 
@@ -18,14 +18,14 @@ impl<D, C> Pair<D, C> {
     }
 }
 
-/// So many of a stream wait for the other to bring their partners; beyond that the oldest goes on alone.
-const MOST_WAITING: usize = 3;
+/// At most this many of a stream wait for the other to bring their partners; beyond that the oldest goes on alone.
+const MAX_WAITING: usize = 3;
 
-/// Pairs what is at most `most_apart_ns` apart. Each stream comes in the order of its time, and may come a few frames
+/// Pairs what is at most `max_apart_ns` apart. Each stream comes in the order of its time, and may come a few frames
 /// after the other.
 #[derive(Debug)]
 pub struct Pairing<D, C> {
-    most_apart_ns: i64,
+    max_apart_ns: i64,
     depth: VecDeque<(i64, D)>,
     color: VecDeque<(i64, C)>,
     ready: VecDeque<Pair<D, C>>,
@@ -33,22 +33,22 @@ pub struct Pairing<D, C> {
 }
 
 impl<D, C> Pairing<D, C> {
-    /// For streams whose partners are at most `most_apart_ns` apart: half the time between frames.
-    pub fn new(most_apart_ns: i64) -> Self {
+    /// For streams whose partners are at most `max_apart_ns` apart: half the time between frames.
+    pub fn new(max_apart_ns: i64) -> Self {
         let (depth, color, ready) = (VecDeque::new(), VecDeque::new(), VecDeque::new());
-        Self { most_apart_ns, depth, color, ready, alone: [0; 2] }
+        Self { max_apart_ns, depth, color, ready, alone: [0; 2] }
     }
 
     /// Takes depth.
     pub fn push_depth(&mut self, time_ns: i64, depth: D) {
         self.depth.push_back((time_ns, depth));
-        self.meet(MOST_WAITING);
+        self.meet(MAX_WAITING);
     }
 
     /// Takes colour.
     pub fn push_color(&mut self, time_ns: i64, color: C) {
         self.color.push_back((time_ns, color));
-        self.meet(MOST_WAITING);
+        self.meet(MAX_WAITING);
     }
 
     /// What waits for a partner goes on alone: no more will come.
@@ -72,7 +72,7 @@ impl<D, C> Pairing<D, C> {
         loop {
             let later = self.depth.front().zip(self.color.front()).map(|(d, c)| d.0.saturating_sub(c.0));
             let (gives_depth, gives_color) = match later {
-                Some(later) if later.abs() <= self.most_apart_ns => (true, true),
+                Some(later) if later.abs() <= self.max_apart_ns => (true, true),
                 Some(later) => (later < 0, later > 0),
                 None => (self.depth.len() > waiting, self.color.len() > waiting),
             };

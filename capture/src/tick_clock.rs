@@ -20,12 +20,12 @@ pub struct TickClock {
 }
 
 impl TickClock {
-    /// A clock of so many ticks a second.
+    /// A clock with this many ticks a second.
     pub fn new(ticks_per_second: u32) -> Self {
         Self { ticks_per_second, last: None, ticks: 0, is_doubted: false }
     }
 
-    /// Device time, nanoseconds, of a frame that tells `ticks` and arrived at `arrival`; `None` where that cannot be.
+    /// Device time, nanoseconds, of a frame that carries `ticks` and arrived at `arrival`; `None` where that cannot be.
     pub fn time_ns(&mut self, ticks: u32, arrival: Instant) -> Option<i64> {
         let step = match self.last {
             None => i64::from(ticks),
@@ -33,13 +33,13 @@ impl TickClock {
                 let passed = arrival.saturating_duration_since(before);
                 let slack = self.ticks_in(SLACK);
                 // Either stream may be a little behind the other.
-                let told = i64::from(ticks.wrapping_sub(last).wrapping_add(slack as u32)) - slack;
-                let is_possible = told <= self.ticks_in(passed) + slack;
+                let counted = i64::from(ticks.wrapping_sub(last).wrapping_add(slack as u32)) - slack;
+                let is_possible = counted <= self.ticks_in(passed) + slack;
                 if !is_possible && !self.is_doubted {
                     self.is_doubted = true;
                     return None;
                 }
-                if is_possible { told } else { self.ticks_in(passed) }
+                if is_possible { counted } else { self.ticks_in(passed) }
             }
         };
         self.is_doubted = false;
@@ -70,8 +70,8 @@ mod tests {
     #[test]
     fn it_goes_on_when_ticks_wrap_between_two_streams() {
         let wrap = [0_u32.wrapping_sub(FRAME), 0, 0_u32.wrapping_sub(FRAME / 2), FRAME];
-        let told: Vec<i64> = times(&wrap).into_iter().flatten().collect();
-        let steps: Vec<i64> = told.windows(2).map(|w| w[1] - w[0]).collect();
+        let device: Vec<i64> = times(&wrap).into_iter().flatten().collect();
+        let steps: Vec<i64> = device.windows(2).map(|w| w[1] - w[0]).collect();
         assert!(steps.iter().zip([33, -17, 50]).all(|(step, truth)| (step - truth).abs() <= 1), "{steps:?}");
     }
 

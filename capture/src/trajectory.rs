@@ -75,10 +75,10 @@ pub fn parse(text: &str) -> Result<Vec<TimedPose>, String> {
 fn parse_line(line: &str) -> Result<TimedPose, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let [time, numbers @ ..] = words.as_slice() else { return Err("is empty".into()) };
-    let time_ns = parse_seconds(time).ok_or_else(|| format!("`{time}` is no time in seconds"))?;
+    let time_ns = parse_seconds(time).ok_or_else(|| format!("`{time}` is not a time in seconds"))?;
     let number = |word: &&str| {
         let value = word.parse().ok().filter(|x: &f64| x.is_finite());
-        value.ok_or_else(|| format!("`{word}` is no finite number"))
+        value.ok_or_else(|| format!("`{word}` is not a finite number"))
     };
     let numbers: Vec<f64> = numbers.iter().map(number).collect::<Result<_, _>>()?;
     let [tx, ty, tz, qx, qy, qz, qw] = numbers[..] else {
@@ -148,9 +148,9 @@ mod tests {
             ("2.5 0 0 0 0 0 0 1 9", "line 3: has 9 values"),
             ("2.5", "line 3: has 1 values"),
             ("2.5 0 0 0 0 0 0 0", "line 3: the rotation qx qy qz qw has length 0.000, not 1"),
-            ("2.5 0 0 NaN 0 0 0 1", "line 3: `NaN` is no finite number"),
-            ("2.5 0 0,1 0 0 0 0 1", "line 3: `0,1` is no finite number"),
-            ("x 0 0 0 0 0 0 1", "line 3: `x` is no time in seconds"),
+            ("2.5 0 0 NaN 0 0 0 1", "line 3: `NaN` is not a finite number"),
+            ("2.5 0 0,1 0 0 0 0 1", "line 3: `0,1` is not a finite number"),
+            ("x 0 0 0 0 0 0 1", "line 3: `x` is not a time in seconds"),
         ];
         for (line, reason) in wrong {
             let error = parse(&format!("{good}{line}\n")).unwrap_err();

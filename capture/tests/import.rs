@@ -80,7 +80,7 @@ fn bad_folders_get_one_clear_sentence() {
         ("timestamps.txt: has 2 lines, but there are 3 frames", |f| {
             fs::write(f.join("timestamps.txt"), "1\n2\n").unwrap();
         }),
-        ("line 2 is no time", |f| fs::write(f.join("timestamps.txt"), "1\nx\n3\n").unwrap()),
+        ("line 2 is not a time", |f| fs::write(f.join("timestamps.txt"), "1\nx\n3\n").unwrap()),
         ("line 3 is not later", |f| fs::write(f.join("timestamps.txt"), "1\n5\n5\n").unwrap()),
         ("must be a 16-bit grey PNG", |f| {
             for i in 0..3 {
@@ -160,12 +160,12 @@ fn real_folders_are_guessed_and_read() {
         metres.sort_by(f64::total_cmp);
         let median = metres[metres.len() / 2];
         assert!((0.5..4.0).contains(&median), "{}: median depth {median} m", case.path);
-        assert!(metres[metres.len() - 1] < 20.0, "{}: 65535 is no depth", case.path);
+        assert!(metres[metres.len() - 1] < 20.0, "{}: 65535 is not a depth", case.path);
         if let Some(color) = frame.color {
             assert_eq!(color.decode(0).unwrap().width, case.size.0);
         }
         let second = source.next_frame().unwrap();
-        assert!(second.is_none_or(|frame| frame.lost_before == 0), "{}: a stride is no loss", case.path);
+        assert!(second.is_none_or(|frame| frame.lost_before == 0), "{}: a stride is not a loss", case.path);
         let poses = import::reference_poses(&path).unwrap().unwrap_or_default();
         assert_eq!(poses.len(), case.poses, "{}", case.path);
     }
@@ -237,4 +237,104 @@ fn tum_lists_pair_by_time() {
     assert_eq!(import::reference_poses(&folder).unwrap().unwrap().len(), 1);
     fs::write(folder.join("depth.txt"), "what is this\n").unwrap();
     assert!(import::open(&folder, None).err().unwrap().to_string().contains("line 1"));
+}
+
+#[test]
+fn twenty_thousand_equal_times_are_no_burden() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path().join("tum");
+    fs::create_dir_all(&folder).unwrap();
+    let depth = image::ImageBuffer::<image::Luma<u16>, _>::from_pixel(640, 480, image::Luma([5000_u16]));
+    depth.save(folder.join("a.png")).unwrap();
+    fs::write(folder.join("depth.txt"), "5.0 a.png\n".repeat(20_000)).unwrap();
+    fs::write(folder.join("rgb.txt"), "5.0 a.png\n".repeat(20_000)).unwrap();
+    let source = import::open(&folder, None).unwrap();
+    assert_eq!(source.frame_count(), Some(20_000), "each colour image has a depth image");
+}
+
+/// Renames the images of a folder: number to name without extension.
+fn rename(folder: &Path, count: u64, name: impl Fn(u64) -> String) {
+    for (part, extension) in [("depth", "png"), ("color", "jpg")] {
+        for i in 0..count {
+            let at = folder.join(part);
+            fs::rename(at.join(format!("{i:06}.{extension}")), at.join(format!("{}.{extension}", name(i)))).unwrap();
+        }
+    }
+}
+
+#[test]
+fn names_that_are_times_give_order_pairing_and_rate() {
+    let names: [fn(u64) -> String; 3] = [
+        |i| format!("{}.{:06}", 1_700_000_000 + (900_000 + i * 50_000) / 1_000_000, (900_000 + i * 50_000) % 1_000_000),
+        |i| (1_700_000_000_900 + i * 50).to_string(),
+        |i| (1_700_000_000_900_000 + i * 50_000).to_string(),
+    ];
+    for name in names {
+        let temp = tempfile::tempdir().unwrap();
+        let folder = image_folder(&temp.path().join("take"), 6);
+        fs::remove_file(folder.join("timestamps.txt")).unwrap();
+        edit(&folder, r#", "fps": 10"#, "");
+        rename(&folder, 6, name);
+        fs::remove_file(folder.join("color").join(name(4) + ".jpg")).unwrap();
+        let mut source = import::open(&folder, None).unwrap();
+        assert!((source.rig().sensors[0].fps - 20.0).abs() < 1e-6, "{}", source.rig().sensors[0].fps);
+        let frames = all_frames(source.as_mut()).unwrap();
+        for (i, frame) in frames.iter().enumerate() {
+            assert_eq!(frame.device_time_ns, 1_700_000_000_900_000_000 + i as i64 * 50_000_000);
+            assert_eq!(frame.depth.as_ref().unwrap().at(0, 0), 1000 + i as u16, "{}", name(i as u64));
+            assert_eq!((frame.color.is_some(), frame.lost_before), (i != 4, 0));
+        }
+    }
+}
+
+#[test]
+fn mixed_names_are_asked_about_and_what_is_not_a_number_is_named() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 3);
+    let one = folder.join("depth/000001.png");
+    let cases = [("12.5.png", "name all images by times or all by numbers"), ("18446744073709551615.png", "12 digits")];
+    for (name, expected) in cases {
+        let renamed = folder.join("depth").join(name);
+        fs::rename(&one, &renamed).unwrap();
+        let error = import::open(&folder, None).err().unwrap().to_string();
+        assert!(error.contains(expected) && error.contains(name), "{error}");
+        fs::rename(&renamed, &one).unwrap();
+    }
+    fs::write(folder.join("timestamps.txt"), "\n").unwrap();
+    let error = import::open(&folder, None).err().unwrap().to_string();
+    assert!(error.contains("has 0 lines, but there are 3 frames"), "{error}");
+}
+
+#[test]
+fn files_that_systems_add_are_passed_over_and_text_may_come_from_windows() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 3);
+    for name in ["depth/._000001.png", "depth/Thumbs.db", "color/.DS_Store", "color/._000002.jpg", "._camera.json"] {
+        fs::write(folder.join(name), b"not an image").unwrap();
+    }
+    for name in ["camera.json", "timestamps.txt"] {
+        let text = fs::read_to_string(folder.join(name)).unwrap();
+        fs::write(folder.join(name), format!("\u{feff}{}", text.replace('\n', "\r\n"))).unwrap();
+    }
+    let frames = all_frames(import::open(&folder, None).unwrap().as_mut()).unwrap();
+    let depths: Vec<u16> = frames.iter().map(|frame| frame.depth.as_ref().unwrap().at(0, 0)).collect();
+    assert_eq!(depths, [1000, 1001, 1002]);
+    assert_eq!(frames[2].device_time_ns, 1_200_000_000);
+}
+
+#[test]
+fn unpadded_pairs_are_in_the_order_of_their_numbers() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 12);
+    let pairs = temp.path().join("pairs");
+    fs::create_dir(&pairs).unwrap();
+    for i in (0..12).filter(|i| *i != 9) {
+        fs::copy(folder.join(format!("depth/{i:06}.png")), pairs.join(format!("depth_{i}.png"))).unwrap();
+        fs::copy(folder.join(format!("color/{i:06}.jpg")), pairs.join(format!("color_{i}.jpg"))).unwrap();
+    }
+    fs::copy(folder.join("camera.json"), pairs.join("camera.json")).unwrap();
+    let frames = all_frames(import::open(&pairs, None).unwrap().as_mut()).unwrap();
+    let depths: Vec<u16> = frames.iter().map(|frame| frame.depth.as_ref().unwrap().at(0, 0)).collect();
+    assert_eq!(depths, [1000, 1001, 1002, 1003, 1004, 1005, 1006, 1007, 1008, 1010, 1011]);
+    assert_eq!(frames[9].lost_before, 1, "number 9 is missing");
 }

@@ -7,7 +7,7 @@ use std::{fs, path::Path};
 
 use common::{all_frames, frame, record_frames, rig};
 use toile_capture::{
-    CaptureError, DepthEncoding, Recorder, RecorderOptions, Replay, Source, depth_codec, export_standard,
+    CaptureError, DepthEncoding, Frame, Recorder, RecorderOptions, Replay, Rig, Source, depth_codec, export_standard,
 };
 
 fn plain() -> RecorderOptions {
@@ -106,20 +106,112 @@ fn damaged_chunks_are_left_out_and_reported() {
     }
 }
 
+/// Replays a file of these bytes: rig and frames, and whether a loss is reported; an error where it is not readable.
+fn replayed(path: &Path, bytes: &[u8]) -> Result<(Rig, Vec<Frame>, bool), CaptureError> {
+    fs::write(path, bytes).unwrap();
+    let mut replay = Replay::open(path)?;
+    let frames = all_frames(&mut replay)?;
+    Ok((replay.rig().clone(), frames, replay.lost().is_some()))
+}
+
 #[test]
 fn flipped_bytes_never_panic_or_lie() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("take.mcap");
-    record_frames(&path, 3, 1, 1200);
+    let written = record_frames(&path, 3, 1, 1200);
     let bytes = fs::read(&path).unwrap();
-    for at in (0..bytes.len()).step_by(3) {
+    let (mut silent, mut noticed) = (0, 0);
+    for at in 0..bytes.len() {
         let mut damaged = bytes.clone();
-        damaged[at] ^= 0xff;
-        fs::write(&path, damaged).unwrap();
-        if let Ok(mut replay) = Replay::open(&path) {
-            let _ = all_frames(&mut replay);
+        damaged[at] ^= if at % 2 == 0 { 0xff } else { 1 << (at % 8) };
+        match replayed(&path, &damaged) {
+            Ok((same_rig, frames, false)) => {
+                silent += 1;
+                assert!(same_rig == rig(1) && frames == written, "byte {at} of {}: silent damage", bytes.len());
+            }
+            Ok((_, _, true)) | Err(_) => noticed += 1,
         }
     }
+    // What is read is everything up to the end of the data; the summary behind it only helps other programs.
+    assert!(noticed > silent && silent > 0, "{noticed} were noticed, {silent} had no effect");
+}
+
+#[test]
+fn swapped_and_repeated_pieces_never_panic_or_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("take.mcap");
+    let written = record_frames(&path, 4, 1, 1200);
+    let bytes = fs::read(&path).unwrap();
+    for (from, to, length) in (0..bytes.len()).step_by(97).map(|at| (at, (at * 7919) % bytes.len(), 1 + at % 300)) {
+        let mut damaged = bytes.clone();
+        let piece = bytes[from..(from + length).min(bytes.len())].to_vec();
+        let end = (to + piece.len()).min(damaged.len());
+        damaged.splice(to..end, piece);
+        if let Ok((same_rig, frames, false)) = replayed(&path, &damaged) {
+            assert!(same_rig == rig(1) && frames == written, "{length} bytes from {from} to {to}: silent damage");
+        }
+    }
+}
+
+/// A chunk record around zstd-packed records, its head claiming `claimed` unpacked bytes.
+fn zstd_chunk(records: &[u8], claimed: u64) -> Vec<u8> {
+    let packed = zstd::bulk::compress(records, 1).unwrap();
+    let mut body = vec![0; 16];
+    body.extend(claimed.to_le_bytes());
+    body.extend(0_u32.to_le_bytes());
+    body.extend([4, 0, 0, 0]);
+    body.extend(b"zstd");
+    body.extend((packed.len() as u64).to_le_bytes());
+    body.extend(packed);
+    let mut record = vec![6];
+    record.extend((body.len() as u64).to_le_bytes());
+    record.extend(body);
+    record
+}
+
+#[test]
+fn a_small_chunk_that_unpacks_to_a_huge_one_is_refused_and_a_lie_about_its_size_is_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("take.mcap");
+    record_frames(&path, 3, 1, 1200);
+    let bytes = fs::read(&path).unwrap();
+    let with_chunk = |chunk: &[u8]| {
+        // Behind the magic bytes and the header record.
+        let head = 8 + 9 + u64::from_le_bytes(bytes[9..17].try_into().unwrap()) as usize;
+        [&bytes[..head], chunk, &bytes[head..]].concat()
+    };
+    let huge = zstd_chunk(&vec![0; 129 << 20], 129 << 20);
+    let error = replayed(&path, &with_chunk(&huge)).unwrap_err().to_string();
+    assert!(error.contains("129 MiB") && error.contains("at most 128 MiB") && error.contains("take.mcap"), "{error}");
+    for claimed in [u64::MAX, 1 << 40, 129 << 20, 0] {
+        let (_, frames, is_lost) = replayed(&path, &with_chunk(&zstd_chunk(&[1; 100], claimed))).unwrap();
+        assert!(is_lost && frames.len() == 3, "claimed {claimed}");
+    }
+    // Lengths whose sum overflows 64 bits.
+    let mut chunk = zstd_chunk(&[1; 100], 100);
+    chunk[9 + 36..9 + 44].copy_from_slice(&u64::MAX.to_le_bytes());
+    let (_, frames, is_lost) = replayed(&path, &with_chunk(&chunk)).unwrap();
+    assert!(is_lost && frames.len() == 3);
+}
+
+#[test]
+fn a_pipe_is_not_waited_for_and_a_link_under_the_temporary_name_is_not_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let [pipe, outside, take] = ["pipe.mcap", "outside", "take.mcap"].map(|name| folder.path().join(name));
+    let mode = rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR;
+    rustix::fs::mknodat(rustix::fs::CWD, &pipe, rustix::fs::FileType::Fifo, mode, 0).unwrap();
+    assert!(message(Replay::open(&pipe).map(|_| ())).contains("not a regular file"));
+    fs::write(&outside, b"precious").unwrap();
+    for replace_part in [true, false] {
+        std::os::unix::fs::symlink(&outside, folder.path().join("take.mcap.part")).unwrap();
+        let options = RecorderOptions { replace_part, ..plain() };
+        let mut recorder = Recorder::create(&take, &rig(1), options.clone()).unwrap();
+        recorder.write(&frame(0, 1)).unwrap();
+        assert!(matches!(Recorder::create(&take, &rig(1), options), Err(CaptureError::Busy { .. })));
+        recorder.finish().unwrap();
+        fs::remove_file(&take).unwrap();
+    }
+    assert_eq!(fs::read(&outside).unwrap(), b"precious");
 }
 
 #[test]
@@ -208,12 +300,12 @@ fn empty_and_foreign_files_get_one_clear_sentence() {
         message(Replay::open(&path).map(|_| ()))
     };
     assert!(open(b"").contains("empty"));
-    assert!(open(b"\x89PNG\r\n\x1a\nhello").contains("no MCAP"));
+    assert!(open(b"\x89PNG\r\n\x1a\nhello").contains("not an MCAP"));
     assert!(open(b"\x89MCAP0\r\n").contains("cut off"));
     let mut foreign = mcap::Writer::new(std::io::Cursor::new(Vec::new())).unwrap();
     foreign.add_channel(0, "/chatter", "json", &Default::default()).unwrap();
     foreign.finish().unwrap();
-    assert!(open(&foreign.into_inner().into_inner()).contains("no recording of Toile's"));
+    assert!(open(&foreign.into_inner().into_inner()).contains("neither a recording of Toile's"));
     Recorder::create(&folder.path().join("none.mcap"), &rig(1), plain()).unwrap().finish().unwrap();
     assert!(message(Replay::open(&folder.path().join("none.mcap")).map(|_| ())).contains("no frames"));
     assert!(message(Replay::open(folder.path()).map(|_| ())).contains("folder"));

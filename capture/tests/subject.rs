@@ -191,6 +191,39 @@ fn inspection_tells_healthy_from_not() {
 }
 
 #[test]
+fn colour_that_is_damaged_behind_its_header_is_counted_and_said() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("images"), 6);
+    // Pixels that do not compress, so that most of the file lies behind the header.
+    let noise =
+        image::RgbImage::from_fn(24, 16, |u, v| image::Rgb([(u * 97 + v * 57) as u8, (u * v * 31) as u8, v as u8]));
+    let [cut, overwritten, padded] = [1, 3, 4].map(|i| folder.join(format!("color/{i:06}.jpg")));
+    noise.save(&cut).unwrap();
+    let whole = fs::read(&cut).unwrap();
+    let scan = whole.windows(2).position(|pair| pair == [0xff, 0xda]).unwrap() + 14;
+    fs::write(&cut, &whole[..(scan + whole.len()) / 2]).unwrap();
+    let mut bytes = whole.clone();
+    bytes[scan + 20..scan + 60].copy_from_slice(&[0xff, 0xd5].repeat(20));
+    fs::write(&overwritten, bytes).unwrap();
+    // Some cameras send whole packets, so that zeros follow the image.
+    fs::write(&padded, [whole, vec![0; 300]].concat()).unwrap();
+    let found = inspect(&folder).unwrap();
+    assert_eq!(found.takes[0].sensors[0].damaged_color, [1, 3]);
+    assert!(!found.healthy && found.data_lost, "{found}");
+    assert!(found.to_string().contains("2 frames have a damaged colour image: 1, 3"), "{found}");
+}
+
+#[test]
+fn names_cannot_steer_the_terminal() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("a\u{1b}[2Jb"), 2);
+    let text = inspect(&folder).unwrap().to_string();
+    assert!(!text.contains('\u{1b}') && text.contains("a\\u{1b}[2Jb"), "{text}");
+    let error = inspect(&folder.join("none")).unwrap_err().to_string();
+    assert!(!error.contains('\u{1b}') && error.contains("none"), "{error}");
+}
+
+#[test]
 fn inspection_of_torn_takes_and_subjects() {
     let temp = tempfile::tempdir().unwrap();
     let mut subject = LockedSubject::create(&temp.path().join("elm")).unwrap();

@@ -1,4 +1,4 @@
-//! Picture buffers of a RealSense camera, in layouts that a kernel could tell.
+//! Picture buffers of a RealSense camera, in layouts that a kernel could announce.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

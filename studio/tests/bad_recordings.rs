@@ -145,3 +145,70 @@ fn a_full_disk_at_import_leaves_nothing_half_written() {
     assert!(message.contains("disk") && message.contains("free some space"), "{message}");
     assert!(!takes.join("00-body.mcap").exists());
 }
+
+/// Starts the same import several times at once; gives how many ended well. The others were refused.
+fn at_once(words: &[Vec<String>]) -> usize {
+    let start = |words: &Vec<String>| toile().args(words).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    let started: Vec<_> = words.iter().map(start).collect();
+    let mut done = 0;
+    for child in started {
+        let output = child.wait_with_output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        match output.status.code() {
+            Some(0) => done += 1,
+            Some(1) => assert!(text.contains("\"busy\""), "{text}"),
+            other => panic!("{other:?}: {text}"),
+        }
+    }
+    done
+}
+
+#[test]
+fn imports_at_once_lose_no_layer_and_tear_no_take() {
+    let recording = Recording::with_noise(5);
+    exits(0, toile().args(recording.import("body")));
+    let takes = recording.subject().join("takes");
+    let count = || toile_capture::Subject::open(&recording.subject()).unwrap().layers().len();
+    let done = at_once(&["coat", "scarf", "hat"].map(|name| recording.import(name)));
+    assert!(done >= 1 && count() == 1 + done, "{done} were imported, there are {} layers", count());
+    let retake = || [recording.import("body"), vec!["--retake".into()]].concat();
+    let done = at_once(&[retake(), retake(), retake()]);
+    assert_eq!(fs::read_dir(takes.join("rejected")).unwrap().count(), done);
+    exits(0, toile().arg("inspect").arg(recording.subject()));
+}
+
+#[test]
+fn an_import_killed_before_it_could_enter_its_take_is_completed_by_the_same_command() {
+    let recording = Recording::new(6, 6);
+    exits(0, toile().args(recording.import("body")));
+    // What the program does, up to where it is killed.
+    let subject = toile_capture::LockedSubject::open(&recording.subject()).unwrap();
+    let mut take = subject.next_take("wrap", Some("skirt")).unwrap();
+    take.source = recording.folder().to_str().unwrap().into();
+    subject.announce(&take).unwrap();
+    fs::copy(recording.subject().join("takes/00-body.mcap"), &take.path).unwrap();
+    drop(subject);
+    let answer = exits(0, toile().args(recording.import("wrap")).args(["--type", "skirt"]));
+    assert!(answer["results"]["take"].as_str().unwrap().ends_with("takes/01-wrap.mcap"), "{answer}");
+    let subject = toile_capture::Subject::open(&recording.subject()).unwrap();
+    assert_eq!(subject.layers()[1].garment.as_deref(), Some("skirt"));
+    exits(1, toile().args(recording.import("wrap")));
+}
+
+#[test]
+fn pipes_are_refused_at_once_and_any_folder_name_will_do() {
+    use std::os::unix::ffi::OsStrExt;
+    let recording = Recording::new(4, 4);
+    let pipe = recording.folder().with_file_name("pipe.mcap");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for command in ["inspect", "fuse"] {
+        let message = exits(1, toile().arg(command).arg(&pipe))["error"]["message"].to_string();
+        assert!(message.contains("not a regular file") && message.contains("pipe.mcap"), "{message}");
+    }
+    let name = std::ffi::OsStr::from_bytes(b"M\xfcller\x1b[2J");
+    let subject = recording.folder().with_file_name(name);
+    let words = ["import".as_ref(), recording.folder().as_os_str(), "--subject".as_ref(), subject.as_os_str()];
+    exits(0, toile().args(words).args(["--layer", "body"]));
+    let shown = toile().arg("inspect").arg(&subject).output().unwrap();
+    assert!(shown.status.success() && !shown.stdout.contains(&0x1b), "{}", String::from_utf8_lossy(&shown.stdout));
+}

@@ -1,7 +1,7 @@
 //! Calibration files: `camera.json` and its relatives.
 //!
-//! Read are: `width`, `height`, `fx`, `fy`, `cx`, `cy` (or Open3D's `intrinsic_matrix`, 9 numbers column by column);
-//! optional `distortion` (k1 k2 p1 p2 k3), `depth_scale` (metres a unit, or units a metre where it is 1 or more), `fps`;
+//! Read are: `width`, `height`, `fx`, `fy`, `cx`, `cy` (or `intrinsic_matrix`, 9 numbers column by column as Open3D
+//! writes them, or row by row); optional `distortion` (k1 k2 p1 p2 k3), `depth_scale` (metres a unit, or units a metre where it is 1 or more), `fps`;
 //! optional `color` (the same fields, of a colour camera that is not registered to depth) with `color_from_depth`
 //! (4×4, 16 numbers row by row, metres).
 
@@ -11,8 +11,8 @@ use nalgebra::Matrix4;
 use serde_json::{Map, Value};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
-use super::{inventory::Listing, poses::rigid_from_matrix};
-use crate::{CaptureError, DeviceIdentity, Rig, Sensor};
+use super::{inventory::Listing, rigid::rigid_from_matrix};
+use crate::{CaptureError, DeviceIdentity, Rig, Sensor, depth_codec::MAX_PIXELS, files::read_text};
 
 /// What a calibration file says.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,12 +71,12 @@ fn find_in(folder: &Path) -> Result<Option<PathBuf>, CaptureError> {
 
 /// Reads a calibration file.
 pub(super) fn read(path: &Path) -> Result<CameraFile, CaptureError> {
-    let text = std::fs::read_to_string(path).map_err(|error| CaptureError::io(path, error))?;
+    let text = read_text(path)?;
     parse(&text).map_err(|reason| CaptureError::format(path, reason))
 }
 
-fn parse(text: &str) -> Result<CameraFile, String> {
-    let value: Value = serde_json::from_str(text).map_err(|error| format!("is no readable JSON: {error}"))?;
+pub(super) fn parse(text: &str) -> Result<CameraFile, String> {
+    let value: Value = serde_json::from_str(text).map_err(|error| format!("is not readable JSON: {error}"))?;
     let object = value.as_object().ok_or("must be a JSON object with width, height, fx, fy, cx, cy")?;
     let depth = parse_camera(object, "")?;
     let depth_scale = optional_positive(object, "depth_scale")?;
@@ -98,10 +98,11 @@ fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCame
     let height = pixels(object, prefix, "height")?;
     let [fx, fy, cx, cy] = match object.get("intrinsic_matrix") {
         Some(matrix) => {
-            let m: [f64; 9] = numbers(matrix).ok_or_else(|| {
-                format!("field `{prefix}intrinsic_matrix` must be a list of 9 numbers, column by column")
-            })?;
-            [m[0], m[4], m[6], m[7]]
+            let m: [f64; 9] = numbers(matrix)
+                .ok_or_else(|| format!("field `{prefix}intrinsic_matrix` must be a list of 9 numbers"))?;
+            // Below the diagonal a camera matrix is zero, which shows the order that it is written in.
+            let is_by_row = m[6] == 0.0 && m[7] == 0.0 && (m[2] != 0.0 || m[5] != 0.0);
+            if is_by_row { [m[0], m[4], m[2], m[5]] } else { [m[0], m[4], m[6], m[7]] }
         }
         None => {
             let number = |name: &str| required(object, prefix, name);
@@ -112,6 +113,14 @@ fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCame
         if focal <= 0.0 {
             return Err(format!("field `{prefix}{name}` is {focal}; a focal length in pixels is above 0"));
         }
+    }
+    for (name, centre, size) in [("cx", cx, width), ("cy", cy, height)] {
+        if !(0.0..=f64::from(size)).contains(&centre) {
+            return Err(format!("field `{prefix}{name}` is {centre}: that is outside of the picture's {size} pixels"));
+        }
+    }
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(format!("fields `{prefix}width` and `{prefix}height`: {width} x {height} pixels are too many"));
     }
     let distortion = match object.get("distortion") {
         None | Some(Value::Null) => [0.0; 5],
@@ -178,8 +187,10 @@ mod tests {
             (GOOD.replace("0.001", "0"), "`depth_scale` is 0"),
             (GOOD.replace("}", r#", "distortion": [1, 2]}"#), "`distortion`"),
             (GOOD.replace("}", r#", "color": {"width": 3}}"#), "`color.height` is missing"),
+            (GOOD.replace("256", "600"), "`cx` is 600"),
+            (GOOD.replace("212", "-1"), "`cy` is -1"),
             ("[]".to_string(), "JSON object"),
-            (GOOD[..40].to_string(), "no readable JSON"),
+            (GOOD[..40].to_string(), "not readable JSON"),
         ];
         for (text, expected) in cases {
             let reason = parse(&text).unwrap_err();
@@ -194,5 +205,7 @@ mod tests {
         let open3d = r#"{"width": 640, "height": 480, "intrinsic_matrix": [525, 0, 0, 0, 524, 0, 319.5, 239.5, 1]}"#;
         let camera = parse(open3d).unwrap().depth;
         assert_eq!(camera, PinholeCamera::ideal(640, 480, 525.0, 524.0, 319.5, 239.5));
+        let by_row = open3d.replace("0, 0, 0, 524, 0, 319.5, 239.5, 1", "0, 319.5, 0, 524, 239.5, 0, 0, 1");
+        assert_eq!(parse(&by_row).unwrap().depth, camera);
     }
 }

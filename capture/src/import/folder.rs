@@ -1,27 +1,24 @@
 //! `toile-folder`: depth/, color/, camera.json, timestamps.txt.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use super::{
-    camera_file,
-    inventory::{DEFAULT_FPS, FolderSource, Listing, last_number, pair, steady_time},
+    camera_file::{self, CameraFile},
+    inventory::{DEFAULT_FPS, Entry, FolderSource, Listing, last_number, measured_fps, pair, steady_time},
+    timed::{Timed, has_extension, named_by_time, pair_by_time},
 };
-use crate::{CaptureError, trajectory::parse_seconds};
+use crate::{CaptureError, files::read_text, printable, trajectory::parse_seconds};
 
 /// Metres a depth unit where the calibration does not say: millimetres.
 const DEPTH_SCALE: f64 = 0.001;
 
 pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, CaptureError> {
-    let depth_folder = path.join("depth");
     if !listing.folders.iter().any(|name| name == "depth") {
         return Err(CaptureError::format(path, "there is no folder depth/ with 16-bit PNG images in it"));
     }
-    let depth = Listing::read(&depth_folder)?.numbered(&depth_folder, numbered(&["png"]))?;
-    let color_name = ["color", "rgb"].into_iter().find(|name| listing.folders.iter().any(|folder| folder == name));
-    let color = match color_name.map(|name| path.join(name)) {
-        Some(folder) => Listing::read(&folder)?.numbered(&folder, numbered(&["jpg", "jpeg", "png"]))?,
-        None => BTreeMap::new(),
-    };
     let Some(camera_path) = camera_file::find(path)? else {
         return Err(CaptureError::format(
             &path.join("camera.json"),
@@ -29,26 +26,64 @@ pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, Captu
         ));
     };
     let camera = camera_file::read(&camera_path)?;
-    let fps = camera.fps.unwrap_or(DEFAULT_FPS);
-    let rig = camera.rig("toile-folder", DEPTH_SCALE, fps, !color.is_empty());
-    let times = read_times(path)?;
-    let mut entries = pair(depth, color, BTreeMap::new(), |_, number| steady_time(number, fps));
-    if let Some(times) = times {
-        let numbers: Vec<u64> = entries.iter().map(|entry| entry.number).collect();
-        let first = first_line(path, &numbers, times.len())?;
-        for (position, entry) in entries.iter_mut().enumerate() {
-            let line = first.map_or(position, |first| (entry.number - first) as usize);
-            entry.time_ns = times[line];
+    let color_name = ["color", "rgb"].into_iter().find(|name| listing.folders.iter().any(|folder| folder == name));
+    let depth = Images::list(path.join("depth"), DEPTH_EXTENSIONS)?;
+    let color = color_name.map(|name| Images::list(path.join(name), COLOR_EXTENSIONS)).transpose()?;
+    let is_timed = matches!(depth, Images::Timed(_));
+    let mut entries = match (depth, color) {
+        (Images::Timed(depth), None) => pair_by_time(depth, Vec::new()),
+        (Images::Timed(depth), Some(Images::Timed(color))) => pair_by_time(depth, color),
+        (Images::Numbered(depth), None) => numbered_pairs(depth, BTreeMap::new(), &camera),
+        (Images::Numbered(depth), Some(Images::Numbered(color))) => numbered_pairs(depth, color, &camera),
+        _ => {
+            let reason = "depth and colour are named differently: one by times, the other by numbers; name both alike";
+            return Err(CaptureError::format(path, reason));
         }
+    };
+    // Numbers may leave some out, so only names that are times show the rate.
+    let rate = if is_timed { measured_fps(&entries) } else { None };
+    if let Some(times) = read_times(path)? {
+        set_times(path, &mut entries, &times)?;
     }
-    FolderSource::new(path, rig, entries, None)
+    let has_color = entries.iter().any(|entry| entry.color.is_some());
+    let fps = camera.fps.or(rate).unwrap_or(DEFAULT_FPS);
+    FolderSource::new(path, camera.rig("toile-folder", DEPTH_SCALE, fps, has_color), entries, None)
 }
 
-fn numbered(extensions: &'static [&'static str]) -> impl Fn(&str) -> Option<u64> {
-    move |name| {
-        let extension = name.rsplit_once('.')?.1.to_ascii_lowercase();
-        if extensions.contains(&extension.as_str()) { last_number(name) } else { None }
+const DEPTH_EXTENSIONS: &[&str] = &["png"];
+const COLOR_EXTENSIONS: &[&str] = &["jpg", "jpeg", "png"];
+
+/// The images of one folder.
+enum Images {
+    Numbered(BTreeMap<u64, PathBuf>),
+    Timed(Vec<Timed>),
+}
+
+impl Images {
+    fn list(folder: PathBuf, extensions: &[&str]) -> Result<Self, CaptureError> {
+        let listing = Listing::read(&folder)?;
+        if let Some(timed) = named_by_time(&folder, &listing, extensions)? {
+            return Ok(Self::Timed(timed));
+        }
+        let number = |name: &str| last_number(name).filter(|_| has_extension(name, extensions));
+        listing.numbered(&folder, number).map(Self::Numbered)
     }
+}
+
+fn numbered_pairs(depth: BTreeMap<u64, PathBuf>, color: BTreeMap<u64, PathBuf>, camera: &CameraFile) -> Vec<Entry> {
+    let fps = camera.fps.unwrap_or(DEFAULT_FPS);
+    pair(depth, color, BTreeMap::new(), |_, number| steady_time(number, fps))
+}
+
+/// Gives frames the times of timestamps.txt.
+fn set_times(path: &Path, entries: &mut [Entry], times: &[i64]) -> Result<(), CaptureError> {
+    let numbers: Vec<u64> = entries.iter().map(|entry| entry.number).collect();
+    let first = first_line(path, &numbers, times.len())?;
+    for (position, entry) in entries.iter_mut().enumerate() {
+        let line = first.map_or(position, |first| (entry.number - first) as usize);
+        entry.time_ns = times[line];
+    }
+    Ok(())
 }
 
 /// Which frame number the first line of timestamps.txt belongs to; `None`: lines go by position.
@@ -58,8 +93,7 @@ fn first_line(path: &Path, numbers: &[u64], lines: usize) -> Result<Option<u64>,
         return Ok(None);
     }
     for first in [0, low.min(1), low] {
-        let span = high - first + 1;
-        if span == lines as u64 {
+        if high.checked_sub(first).and_then(|last| last.checked_add(1)) == Some(lines as u64) {
             return Ok(Some(first));
         }
     }
@@ -81,13 +115,16 @@ fn read_times(folder: &Path) -> Result<Option<Vec<i64>>, CaptureError> {
     if !path.exists() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(&path).map_err(|error| CaptureError::io(&path, error))?;
+    let text = read_text(&path)?;
     let mut times: Vec<i64> = Vec::new();
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let word = line.trim();
         let time = if word.contains('.') { parse_seconds(word) } else { word.parse().ok() };
         let time = time.ok_or_else(|| {
-            CaptureError::format(&path, format!("line {} is no time in nanoseconds: `{word}`", number + 1))
+            CaptureError::format(
+                &path,
+                format!("line {} is not a time in nanoseconds: `{}`", number + 1, printable(word)),
+            )
         })?;
         if times.last().is_some_and(|&before| before >= time) {
             return Err(CaptureError::format(&path, format!("line {} is not later than the one before", number + 1)));

@@ -12,7 +12,11 @@ use crate::{CaptureError, Frame, Rig, Source};
 /// Nominal rate where a folder does not say one (the common one of Kinect-class sensors).
 pub(super) const DEFAULT_FPS: f64 = 30.0;
 
-/// The names in a folder, sorted.
+/// The largest frame number: a larger one is something else, and would only be rounded.
+const MAX_NUMBER: u64 = 999_999_999_999;
+
+/// The names in a folder, sorted. Files that operating systems add (hidden ones such as `._000001.png` of a Mac, and
+/// `Thumbs.db` or `desktop.ini`) are passed over.
 #[derive(Debug, Default)]
 pub(super) struct Listing {
     pub(super) files: Vec<String>,
@@ -25,6 +29,9 @@ impl Listing {
         for entry in std::fs::read_dir(path).map_err(|error| CaptureError::io(path, error))? {
             let entry = entry.map_err(|error| CaptureError::io(path, error))?;
             let Ok(name) = entry.file_name().into_string() else { continue };
+            if is_of_the_system(&name) {
+                continue;
+            }
             let list = if entry.path().is_dir() { &mut listing.folders } else { &mut listing.files };
             list.push(name);
         }
@@ -33,7 +40,7 @@ impl Listing {
         Ok(listing)
     }
 
-    /// The files that `number` knows, by their number.
+    /// The files for whose name `number` gives a number, by that number.
     pub(super) fn numbered(
         &self,
         folder: &Path,
@@ -42,6 +49,10 @@ impl Listing {
         let mut files = BTreeMap::new();
         for name in &self.files {
             let Some(number) = number(name) else { continue };
+            if number > MAX_NUMBER {
+                let reason = format!("{number} in its name is not a frame number: it has more than 12 digits");
+                return Err(CaptureError::format(&folder.join(name), reason));
+            }
             if let Some(other) = files.insert(number, folder.join(name)) {
                 let reason = format!("has the same number as {}", other.display());
                 return Err(CaptureError::format(&folder.join(name), reason));
@@ -49,6 +60,10 @@ impl Listing {
         }
         Ok(files)
     }
+}
+
+fn is_of_the_system(name: &str) -> bool {
+    name.starts_with('.') || ["thumbs.db", "desktop.ini"].contains(&name.to_ascii_lowercase().as_str())
 }
 
 /// The last run of digits in a file's stem: its frame number.
@@ -88,6 +103,14 @@ pub(super) fn pair(
         mask: mask.remove(&number),
     };
     numbers.into_iter().enumerate().map(entry).collect()
+}
+
+/// The rate that the frames' own times show: one divided by the median step; `None` where they do not rise.
+pub(super) fn measured_fps(entries: &[Entry]) -> Option<f64> {
+    let step = |pair: &[Entry]| pair[1].time_ns.saturating_sub(pair[0].time_ns);
+    let mut steps: Vec<i64> = entries.windows(2).map(step).collect();
+    steps.sort_unstable();
+    steps.get(steps.len() / 2).filter(|step| **step > 0).map(|step| 1e9 / *step as f64)
 }
 
 /// Time of frame `number` at a steady rate from 0.

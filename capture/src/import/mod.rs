@@ -6,10 +6,10 @@
 //! | `tum` | TUM RGB-D: `depth.txt`, `rgb.txt`; or pairs such as `X_depth.png`, `X_color.png` |
 //! | `uva` | `N.jpg`, `N_depth.png`, `N_mask.jpg`, `N_camera.xml` |
 //! | `seven-scenes` | `frame-N.color.jpg`, `frame-N.depth.png`, `frame-N.pose.txt`, `camera-intrinsics.txt` |
-//! | `mcap` | a recording of Toile's own |
+//! | `mcap` | a recording of Toile's own, or of another program with Foxglove's messages |
 //!
 //! Nothing but names and calibration is read on opening; each frame is read when it is asked for. Frames pair by their
-//! numbers (TUM: by their times); where one of a pair is missing, the other is delivered alone.
+//! numbers (TUM, and files that are named by times: by their times); where one of a pair is missing, the other is delivered alone.
 //!
 //! ```no_run
 //! use toile_capture::import;
@@ -24,151 +24,27 @@ mod camera_file;
 mod folder;
 mod images;
 mod inventory;
+mod layout;
+mod number_list;
 mod poses;
-pub(crate) mod record;
+mod record;
+mod rigid;
 mod seven_scenes;
+mod timed;
 mod tum;
 mod uva;
 
-use std::{fmt, path::Path, str::FromStr};
-
-use crate::{CaptureError, Replay, Source};
-
+pub use layout::{Format, ImportOptions, guess, open, open_with};
+pub(crate) use number_list::number_list;
 pub use poses::reference_poses;
 pub use record::{ImportReport, record};
 
-use inventory::{FolderSource, Listing};
-
-/// The layouts that can be imported.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// `depth/`, `color/`, `camera.json`, `timestamps.txt`.
-    ToileFolder,
-    /// TUM RGB-D.
-    Tum,
-    /// University of Amsterdam's person turning before a sensor.
-    Uva,
-    /// Microsoft 7-Scenes.
-    SevenScenes,
-    /// A recording of Toile's own.
-    Mcap,
+/// Reads the text of a calibration file as each reader of one would; for `fuzz/`.
+pub(crate) fn parse_calibration(text: &str) {
+    let _ = (camera_file::parse(text), uva::parse_matrix::<9>(text, "intrinsic"));
 }
 
-impl Format {
-    /// Every format, in the order in which they are listed to people.
-    pub const ALL: [Self; 5] = [Self::ToileFolder, Self::Tum, Self::Uva, Self::SevenScenes, Self::Mcap];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ToileFolder => "toile-folder",
-            Self::Tum => "tum",
-            Self::Uva => "uva",
-            Self::SevenScenes => "seven-scenes",
-            Self::Mcap => "mcap",
-        }
-    }
-}
-
-impl fmt::Display for Format {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Format {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.into_iter().find(|format| format.name() == text);
-        known.ok_or_else(|| format!("`{text}` is no format; choose one of {}", names()))
-    }
-}
-
-/// How to import.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ImportOptions {
-    /// The layout; guessed from the folder's content where it is `None`.
-    pub format: Option<Format>,
-    /// Set depth outside of the person masks to "missing", where a folder has masks (`uva`). Default: false, depth as
-    /// it was measured.
-    pub apply_mask: bool,
-}
-
-/// Opens a folder (or a recording) as a source of frames; the format is guessed where it is `None`.
-///
-/// # Errors
-/// [`CaptureError`] that names the file or field that is missing or wrong.
-pub fn open(path: &Path, format: Option<Format>) -> Result<Box<dyn Source>, CaptureError> {
-    open_with(path, &ImportOptions { format, ..ImportOptions::default() })
-}
-
-/// [`open`] with all options.
-///
-/// # Errors
-/// As [`open`].
-pub fn open_with(path: &Path, options: &ImportOptions) -> Result<Box<dyn Source>, CaptureError> {
-    let format = match options.format {
-        Some(format) => format,
-        None => guess(path)?,
-    };
-    if format == Format::Mcap {
-        return Ok(Box::new(Replay::open(path)?));
-    }
-    Ok(Box::new(open_folder(path, format, options.apply_mask)?))
-}
-
-/// Guesses a folder's format from the names in it.
-///
-/// # Errors
-/// [`CaptureError`] where there is no such folder or nothing in it is known; the message lists what is.
-pub fn guess(path: &Path) -> Result<Format, CaptureError> {
-    if path.is_file() {
-        return Ok(Format::Mcap);
-    }
-    let listing = Listing::read(path)?;
-    guess_listing(&listing).ok_or_else(|| unknown(path, &listing))
-}
-
-fn guess_listing(listing: &Listing) -> Option<Format> {
-    let any = |test: &dyn Fn(&str) -> bool| listing.files.iter().any(|name| test(name));
-    if any(&|name| name == "depth.txt") {
-        Some(Format::Tum)
-    } else if listing.folders.iter().any(|name| name == "depth") {
-        Some(Format::ToileFolder)
-    } else if any(&|name| seven_scenes::is_depth(name)) {
-        Some(Format::SevenScenes)
-    } else if any(&|name| uva::is_camera(name)) {
-        Some(Format::Uva)
-    } else if any(&tum::is_paired_depth) {
-        Some(Format::Tum)
-    } else {
-        None
-    }
-}
-
-fn open_folder(path: &Path, format: Format, apply_mask: bool) -> Result<FolderSource, CaptureError> {
-    let listing = Listing::read(path)?;
-    match format {
-        Format::ToileFolder => folder::open(path, &listing),
-        Format::Tum => tum::open(path, &listing),
-        Format::Uva => uva::open(path, &listing, apply_mask),
-        Format::SevenScenes => seven_scenes::open(path, &listing),
-        Format::Mcap => Err(CaptureError::format(path, "is a folder, not a recording")),
-    }
-}
-
-fn unknown(path: &Path, listing: &Listing) -> CaptureError {
-    let inside = |name: &&String| Listing::read(&path.join(name)).is_ok_and(|inner| guess_listing(&inner).is_some());
-    let hints: Vec<_> = listing.folders.iter().filter(inside).map(String::as_str).collect();
-    let hint = if hints.is_empty() {
-        format!("say it with --format ({}) or look at what is in the folder", names())
-    } else {
-        format!("did you mean a folder in it: {}?", hints.join(", "))
-    };
-    CaptureError::format(path, format!("no known layout of depth images is in this folder; {hint}"))
-}
-
-fn names() -> String {
-    Format::ALL.map(Format::name).join(", ")
+/// Reads a file's name; for `fuzz/`.
+pub(crate) fn parse_name(name: &str) {
+    let _ = (timed::time_of_name(name), inventory::last_number(name), tum::natural(name));
 }

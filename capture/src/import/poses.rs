@@ -2,12 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Matrix3, Matrix4, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector3};
 use toile_geometry::Rigid;
 
-use super::{FolderSource, Format, guess, open_folder, uva};
+use super::{
+    inventory::FolderSource,
+    layout::{Format, guess, open_folder},
+    rigid::{rigid_from_matrix, rigid_from_parts},
+    uva,
+};
 use crate::{
     CaptureError,
+    files::read_text,
     trajectory::{self, TimedPose},
 };
 
@@ -48,12 +54,12 @@ fn uva_pose(depth: &Path) -> Result<Option<Rigid>, CaptureError> {
     let r = Matrix3::from_row_slice(&uva::read_matrix::<9>(&path, "R")?);
     let [x, y, z] = uva::read_matrix::<3>(&path, "t")?;
     let pose = rigid_from_parts(&r, Vector3::new(x, y, z));
-    pose.map(Some).ok_or_else(|| CaptureError::format(&path, "field `R` is no rotation"))
+    pose.map(Some).ok_or_else(|| CaptureError::format(&path, "field `R` is not a rotation"))
 }
 
 fn seven_scenes_pose(depth: &Path) -> Result<Option<Rigid>, CaptureError> {
     let Some(path) = sibling(depth, ".depth.png", ".pose.txt") else { return Ok(None) };
-    let text = std::fs::read_to_string(&path).map_err(|error| CaptureError::io(&path, error))?;
+    let text = read_text(&path)?;
     let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
     let matrix = numbers.filter(|numbers| numbers.len() == 16).map(|numbers| Matrix4::from_row_slice(&numbers));
     let pose = matrix.and_then(|matrix| rigid_from_matrix(&matrix));
@@ -78,7 +84,7 @@ fn beside(folder: &Path, format: Format) -> Result<Option<Vec<TimedPose>>, Captu
     if !log.is_file() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(&log).map_err(|error| CaptureError::io(&log, error))?;
+    let text = read_text(&log)?;
     let source = open_folder(folder, format, false)?;
     parse_log(&text, &source).map(Some).ok_or_else(|| {
         CaptureError::format(&log, "must hold, a frame, a line of three numbers and a 4x4 rigid transform")
@@ -97,20 +103,4 @@ fn parse_log(text: &str, source: &FolderSource) -> Option<Vec<TimedPose>> {
         Some(TimedPose { time_ns, pose: rigid_from_matrix(&Matrix4::from_row_slice(&block[3..]))? })
     };
     blocks.iter().map(pose).collect()
-}
-
-/// A rigid transform from a 4×4 matrix whose rotation may be rounded; `None` where it is no rotation.
-pub(super) fn rigid_from_matrix(matrix: &Matrix4<f64>) -> Option<Rigid> {
-    let rotation = matrix.fixed_view::<3, 3>(0, 0).into_owned();
-    rigid_from_parts(&rotation, matrix.fixed_view::<3, 1>(0, 3).into_owned())
-}
-
-fn rigid_from_parts(rotation: &Matrix3<f64>, translation: Vector3<f64>) -> Option<Rigid> {
-    let finite = rotation.iter().chain(translation.iter()).all(|x| x.is_finite());
-    let error = (rotation.transpose() * rotation - Matrix3::identity()).norm();
-    if !finite || error > 0.01 || rotation.determinant() < 0.0 {
-        return None;
-    }
-    let rotation = Rotation3::from_matrix_eps(rotation, 1e-12, 100, Rotation3::identity());
-    Some(Rigid::from_parts(Translation3::from(translation), UnitQuaternion::from_rotation_matrix(&rotation)))
 }

@@ -4,7 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::{CaptureError, Recorder, Source};
+use super::number_list::number_list;
+use crate::{CaptureError, Frame, Recorder, Rig, Source};
 
 /// What an import copied, and what it could not.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
@@ -24,6 +25,18 @@ pub struct ImportReport {
 }
 
 impl ImportReport {
+    /// Counts a frame that was copied.
+    fn count(&mut self, frame: &Frame, rig: &Rig) {
+        self.frames += 1;
+        if frame.depth.is_none() {
+            self.without_depth.push(frame.device_frame);
+        }
+        let has_color_camera = rig.sensors.get(frame.sensor).is_some_and(|sensor| sensor.color.is_some());
+        if frame.color.is_none() && has_color_camera {
+            self.without_color.push(frame.device_frame);
+        }
+    }
+
     /// True where nothing is missing.
     pub fn is_complete(&self) -> bool {
         self.without_depth.is_empty() && self.without_color.is_empty() && self.lost == 0 && self.unreadable.is_empty()
@@ -74,14 +87,7 @@ pub fn record(
                 report.lost += u64::from(frame.lost_before);
                 frame.lost_before = frame.lost_before.saturating_add(std::mem::take(&mut skipped));
                 recorder.write(&frame)?;
-                report.frames += 1;
-                let has_color_camera = recorder.rig().sensors[frame.sensor].color.is_some();
-                if frame.depth.is_none() {
-                    report.without_depth.push(frame.device_frame);
-                }
-                if frame.color.is_none() && has_color_camera {
-                    report.without_color.push(frame.device_frame);
-                }
+                report.count(&frame, recorder.rig());
             }
             Err(error @ CaptureError::Device { .. }) => return Err(error),
             Err(error) => {
@@ -98,32 +104,5 @@ pub fn record(
             report.bytes = recorder.finish()?.bytes;
             Ok(report)
         }
-    }
-}
-
-/// Numbers for people: ranges where they follow each other, the first few of many.
-pub(crate) fn number_list(numbers: &[u64]) -> String {
-    let mut ranges: Vec<(u64, u64)> = Vec::new();
-    for &number in numbers {
-        match ranges.last_mut() {
-            Some((_, last)) if last.checked_add(1) == Some(number) => *last = number,
-            _ => ranges.push((number, number)),
-        }
-    }
-    let text = |&(first, last): &(u64, u64)| if first == last { first.to_string() } else { format!("{first}-{last}") };
-    let shown: Vec<String> = ranges.iter().take(8).map(text).collect();
-    let more = if ranges.len() > shown.len() { ", ..." } else { "" };
-    format!("{}{more}", shown.join(", "))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_listed_as_ranges() {
-        assert_eq!(number_list(&[3, 4, 5, 9]), "3-5, 9");
-        assert_eq!(number_list(&[u64::MAX]), u64::MAX.to_string());
-        assert!(number_list(&(0..40).map(|i| 2 * i).collect::<Vec<_>>()).ends_with(", ..."));
     }
 }

@@ -10,7 +10,7 @@ use super::{
     images,
     inventory::{DEFAULT_FPS, FolderSource, Listing, last_number, pair, steady_time},
 };
-use crate::CaptureError;
+use crate::{CaptureError, files::read_text};
 
 const DEPTH_SCALE: f64 = 0.001;
 const MISSING: u16 = 65535;
@@ -44,7 +44,7 @@ fn read_camera(folder: &Path, listing: &Listing, size: (u32, u32)) -> Result<Cam
     let (width, height) = size;
     if listing.files.iter().any(|name| name == "camera-intrinsics.txt") {
         let path = folder.join("camera-intrinsics.txt");
-        let text = std::fs::read_to_string(&path).map_err(|error| CaptureError::io(&path, error))?;
+        let text = read_text(&path)?;
         let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
         let camera =
             numbers.filter(|k| k.len() == 9).map(|k| PinholeCamera::ideal(width, height, k[0], k[4], k[2], k[5]));

@@ -11,26 +11,22 @@ use toile_geometry::camera::PinholeCamera;
 use super::{
     camera_file::{self, CameraFile},
     images,
-    inventory::{DEFAULT_FPS, Entry, FolderSource, Listing, pair, steady_time},
+    inventory::{DEFAULT_FPS, Entry, FolderSource, Listing, last_number, measured_fps, pair, steady_time},
+    timed::{Timed, has_extension, pair_by_time},
 };
-use crate::{CaptureError, trajectory::parse_seconds};
+use crate::{CaptureError, files::read_text, printable, trajectory::parse_seconds};
 
+/// Numbers in names from here on are something else, such as dates or times, and only give the order.
+const MAX_COUNT: u64 = 10_000_000;
 /// Metres a depth unit.
 const DEPTH_SCALE: f64 = 1.0 / 5000.0;
-/// Depth and colour further apart than this do not belong together (the benchmark's own default).
-const MAX_APART_NS: i64 = 20_000_000;
-
-struct Timed {
-    time_ns: i64,
-    path: PathBuf,
-}
 
 pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, CaptureError> {
     let entries = if listing.files.iter().any(|name| name == "depth.txt") {
         let depth = read_list(path, "depth.txt")?;
         let has_color = listing.files.iter().any(|name| name == "rgb.txt");
         let color = if has_color { read_list(path, "rgb.txt")? } else { Vec::new() };
-        associate(depth, color)
+        pair_by_time(depth, color)
     } else {
         named_pairs(path, listing)?
     };
@@ -39,7 +35,8 @@ pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, Captu
         None => default_camera(path, &entries)?,
     };
     let has_color = entries.iter().any(|entry| entry.color.is_some());
-    let rig = camera.rig("tum", DEPTH_SCALE, camera.fps.unwrap_or(DEFAULT_FPS), has_color);
+    let fps = camera.fps.or_else(|| measured_fps(&entries)).unwrap_or(DEFAULT_FPS);
+    let rig = camera.rig("tum", DEPTH_SCALE, fps, has_color);
     FolderSource::new(path, rig, entries, None)
 }
 
@@ -49,43 +46,9 @@ pub(super) fn is_paired_depth(name: &str) -> bool {
     name.ends_with(".png") && name.contains("depth")
 }
 
-/// Pairs each depth image with the colour image nearest in time, closest pairs first, each used once.
-fn associate(depth: Vec<Timed>, color: Vec<Timed>) -> Vec<Entry> {
-    let mut pairs = Vec::new();
-    for (i, d) in depth.iter().enumerate() {
-        let near = color.partition_point(|c| c.time_ns < d.time_ns.saturating_sub(MAX_APART_NS));
-        for (j, c) in color.iter().enumerate().skip(near) {
-            let apart = c.time_ns.saturating_sub(d.time_ns).saturating_abs();
-            if apart > MAX_APART_NS {
-                break;
-            }
-            pairs.push((apart, i, j));
-        }
-    }
-    pairs.sort_unstable();
-    let mut partner = vec![None; depth.len()];
-    let mut taken = vec![false; color.len()];
-    for (_, i, j) in pairs {
-        if partner[i].is_none() && !taken[j] {
-            partner[i] = Some(j);
-            taken[j] = true;
-        }
-    }
-    let paired = depth.into_iter().zip(partner).map(|(d, j)| entry(d.time_ns, Some(d.path), j.map(|j| &color[j])));
-    let alone = color.iter().zip(&taken).filter(|(_, taken)| !**taken).map(|(c, _)| entry(c.time_ns, None, Some(c)));
-    let mut entries: Vec<Entry> = paired.chain(alone).collect();
-    entries.sort_by_key(|entry| entry.time_ns);
-    entries.iter_mut().enumerate().for_each(|(number, entry)| entry.number = number as u64);
-    entries
-}
-
-fn entry(time_ns: i64, depth: Option<PathBuf>, color: Option<&Timed>) -> Entry {
-    Entry { number: 0, time_ns, depth, color: color.map(|c| c.path.clone()), mask: None }
-}
-
 fn read_list(folder: &Path, name: &str) -> Result<Vec<Timed>, CaptureError> {
     let path = folder.join(name);
-    let text = std::fs::read_to_string(&path).map_err(|error| CaptureError::io(&path, error))?;
+    let text = read_text(&path)?;
     let mut list = Vec::new();
     for (number, line) in text.lines().enumerate() {
         let line = line.split('#').next().unwrap_or("").trim();
@@ -95,24 +58,16 @@ fn read_list(folder: &Path, name: &str) -> Result<Vec<Timed>, CaptureError> {
         let timed = line
             .split_once(char::is_whitespace)
             .and_then(|(time, file)| Some(Timed { time_ns: parse_seconds(time)?, path: folder.join(file.trim()) }));
-        list.push(
-            timed.ok_or_else(|| {
-                CaptureError::format(&path, format!("line {} is not `time file`: `{line}`", number + 1))
-            })?,
-        );
+        list.push(timed.ok_or_else(|| {
+            CaptureError::format(&path, format!("line {} is not `time file`: `{}`", number + 1, printable(line)))
+        })?);
     }
-    list.sort_by_key(|timed| timed.time_ns);
     Ok(list)
 }
 
-/// Pairs by name: `X_depth.png` belongs to `X_color.*` or `X_rgb.*`.
+/// Pairs by name: `X_depth.png` belongs to `X_color.*` or `X_rgb.*`. Where every name has a number of its own, frames are
+/// in the order of these numbers and carry them; otherwise in the order of their names, in which numbers count as numbers.
 fn named_pairs(folder: &Path, listing: &Listing) -> Result<Vec<Entry>, CaptureError> {
-    let key = |name: &str, word: &str| {
-        let name = name.to_ascii_lowercase();
-        let (stem, extension) = name.rsplit_once('.')?;
-        let image = matches!(extension, "png" | "jpg" | "jpeg");
-        (image && stem.contains(word)).then(|| stem.replace(word, ""))
-    };
     let collect = |words: &[&str]| -> BTreeMap<String, PathBuf> {
         let keyed = |name: &String| words.iter().find_map(|word| Some((key(name, word)?, folder.join(name))));
         listing.files.iter().filter_map(keyed).collect()
@@ -121,12 +76,45 @@ fn named_pairs(folder: &Path, listing: &Listing) -> Result<Vec<Entry>, CaptureEr
     if depth.is_empty() {
         return Err(CaptureError::format(&folder.join("depth.txt"), "is missing: it lists the depth images' times"));
     }
-    let numbers: BTreeMap<&String, u64> =
-        depth.keys().chain(color.keys()).collect::<std::collections::BTreeSet<_>>().into_iter().zip(0..).collect();
-    let by_number = |files: &BTreeMap<String, PathBuf>| {
-        files.iter().map(|(key, path)| (numbers[key], path.clone())).collect::<BTreeMap<u64, PathBuf>>()
+    let numbers = frame_numbers(depth.keys().chain(color.keys()));
+    let by_number = |files: BTreeMap<String, PathBuf>| -> BTreeMap<u64, PathBuf> {
+        files.into_iter().map(|(key, path)| (numbers[&key], path)).collect()
     };
-    Ok(pair(by_number(&depth), by_number(&color), BTreeMap::new(), |_, number| steady_time(number, DEFAULT_FPS)))
+    Ok(pair(by_number(depth), by_number(color), BTreeMap::new(), |_, number| steady_time(number, DEFAULT_FPS)))
+}
+
+/// An image's name without its extension and without `word`, which must be in it.
+fn key(name: &str, word: &str) -> Option<String> {
+    let name = name.to_ascii_lowercase();
+    let (stem, _) = name.rsplit_once('.').filter(|_| has_extension(&name, &["png", "jpg", "jpeg"]))?;
+    stem.contains(word).then(|| stem.replace(word, ""))
+}
+
+/// A frame number for each key.
+fn frame_numbers<'a>(keys: impl Iterator<Item = &'a String>) -> BTreeMap<String, u64> {
+    let mut keys: Vec<&String> = keys.collect();
+    keys.sort_by_cached_key(|key| natural(key));
+    keys.dedup();
+    let own: Option<BTreeMap<u64, &String>> =
+        keys.iter().map(|key| Some((last_number(key).filter(|n| *n < MAX_COUNT)?, *key))).collect();
+    match own.filter(|own| own.len() == keys.len()) {
+        Some(own) => own.into_iter().map(|(number, key)| (key.clone(), number)).collect(),
+        None => keys.into_iter().cloned().zip(0..).collect(),
+    }
+}
+
+/// A key that sorts names as people do: runs of digits by their value. The name itself decides between equals.
+pub(super) fn natural(name: &str) -> (Vec<(String, usize, String)>, String) {
+    let mut parts = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let (text, behind) = rest.split_at(rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len()));
+        let (digits, behind) = behind.split_at(behind.find(|c: char| !c.is_ascii_digit()).unwrap_or(behind.len()));
+        let value = digits.trim_start_matches('0');
+        parts.push((text.to_string(), value.len(), value.to_string()));
+        rest = behind;
+    }
+    (parts, name.to_string())
 }
 
 /// The benchmark's recommended intrinsics for 640×480, where a folder brings none.
@@ -146,22 +134,19 @@ fn default_camera(folder: &Path, entries: &[Entry]) -> Result<CameraFile, Captur
 mod tests {
     use super::*;
 
-    fn timed(milliseconds: &[i64]) -> Vec<Timed> {
-        let one = |&ms: &i64| Timed { time_ns: ms * 1_000_000, path: PathBuf::from(format!("{ms}")) };
-        milliseconds.iter().map(one).collect()
+    fn numbers(keys: &[&str]) -> Vec<(String, u64)> {
+        let keys: Vec<String> = keys.iter().map(|key| key.to_string()).collect();
+        let mut numbers: Vec<_> = frame_numbers(keys.iter()).into_iter().collect();
+        numbers.sort_by_key(|(_, number)| *number);
+        numbers
     }
 
     #[test]
-    fn associates_each_image_once_with_the_nearest() {
-        let entries = associate(timed(&[0, 30, 60, 200]), timed(&[5, 33, 38, 61, 400]));
-        let names: Vec<_> = entries
-            .iter()
-            .map(|e| {
-                let name = |p: &Option<PathBuf>| p.as_ref().map_or("-".into(), |p| p.display().to_string());
-                format!("{}/{}", name(&e.depth), name(&e.color))
-            })
-            .collect();
-        assert_eq!(names, ["0/5", "30/33", "-/38", "60/61", "200/-", "-/400"]);
-        assert!(entries.iter().enumerate().all(|(i, e)| e.number == i as u64));
+    fn names_without_padding_are_in_the_order_of_their_numbers() {
+        let order = |keys: &[&str]| numbers(keys).into_iter().map(|(key, _)| key).collect::<Vec<_>>();
+        assert_eq!(order(&["_10", "_2", "_1", "_0"]), ["_0", "_1", "_2", "_10"]);
+        assert_eq!(order(&["b", "a10", "a9", "a"]), ["a", "a9", "a10", "b"]);
+        assert_eq!(order(&["x2_7", "x10_7", "x1_7"]), ["x1_7", "x2_7", "x10_7"], "the last number is not their own");
+        assert_eq!(numbers(&["_7", "_10"]), [("_7".to_string(), 7), ("_10".to_string(), 10)]);
     }
 }

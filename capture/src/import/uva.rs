@@ -10,7 +10,7 @@ use super::{
     images,
     inventory::{DEFAULT_FPS, FolderSource, Listing, last_number, pair, steady_time},
 };
-use crate::CaptureError;
+use crate::{CaptureError, files::read_text};
 
 const DEPTH_SCALE: f64 = 0.001;
 
@@ -29,7 +29,7 @@ pub(super) fn open(path: &Path, listing: &Listing, apply_mask: bool) -> Result<F
     let k = read_matrix::<9>(camera, "intrinsic")?;
     let camera_model = PinholeCamera::ideal(width, height, k[0], k[4], k[2], k[5]);
     if !camera_model.is_valid() {
-        return Err(CaptureError::format(camera, "field `intrinsic` is no camera matrix"));
+        return Err(CaptureError::format(camera, "field `intrinsic` is not a camera matrix"));
     }
     let rig = CameraFile::ideal(camera_model).rig("uva", DEPTH_SCALE, DEFAULT_FPS, !color.is_empty());
     let entries = pair(depth, color, masks, |_, number| steady_time(number, DEFAULT_FPS));
@@ -47,12 +47,12 @@ pub(super) fn numbered(name: &str, suffix: &str) -> Option<u64> {
 
 /// The numbers of a matrix in an OpenCV XML storage.
 pub(super) fn read_matrix<const N: usize>(path: &Path, name: &str) -> Result<[f64; N], CaptureError> {
-    let text = std::fs::read_to_string(path).map_err(|error| CaptureError::io(path, error))?;
+    let text = read_text(path)?;
     parse_matrix(&text, name)
-        .ok_or_else(|| CaptureError::format(path, format!("field `{name}` is missing or has not {N} numbers")))
+        .ok_or_else(|| CaptureError::format(path, format!("field `{name}` is missing, or does not have {N} numbers")))
 }
 
-fn parse_matrix<const N: usize>(text: &str, name: &str) -> Option<[f64; N]> {
+pub(super) fn parse_matrix<const N: usize>(text: &str, name: &str) -> Option<[f64; N]> {
     let element = text.split_once(&format!("<{name} "))?.1.split_once(&format!("</{name}>"))?.0;
     let data = element.split_once("<data>")?.1.split_once("</data>")?.0;
     let numbers: Vec<f64> = data.split_whitespace().map(|word| word.parse().ok()).collect::<Option<_>>()?;

@@ -194,7 +194,7 @@ impl LockedSubject {
         Ok(locked)
     }
 
-    /// Takes what `pending.toml` tells of for finished where its recording is whole.
+    /// Completes the take that `pending.toml` names, where its recording is whole.
     fn complete_pending(&mut self) -> Result<(), CaptureError> {
         let Some(note) = Note::read(self.folder()) else { return Ok(()) };
         if note.retake && note.number < self.layers().len() && self.retake_path(&note.layer).is_file() {

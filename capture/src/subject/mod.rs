@@ -26,3 +26,8 @@ pub use lock::SubjectLock;
 pub use locked::LockedSubject;
 pub use pending::PendingTake;
 pub use reading::Subject;
+
+/// Reads the text of `subject.toml` and of `pending.toml`; for `fuzz/`.
+pub(crate) fn parse(text: &str) {
+    let _ = (about::About::parse(text), about::parse_toml::<pending::Note>(text));
+}

@@ -100,7 +100,7 @@ impl Subject {
         self.takes_folder().join(format!("{}.retake.mcap", layer.label()))
     }
 
-    /// Enters recordings that no layer has yet: the one that `pending.toml` tells of with its type, others by name.
+    /// Enters recordings that no layer has yet: the one that `pending.toml` names with its type, others by name.
     fn adopt_takes(&mut self) {
         let note = Note::read(&self.folder).filter(|note| !note.retake);
         while let Some(name) = self.recorded_name(self.about.layers.len()) {

@@ -32,9 +32,8 @@ impl Inspect {
         let found = inspect(&self.path)?;
         let (mut warnings, mut lost) = (Vec::new(), Vec::new());
         for take in &found.takes {
-            let is_lost = take.loss.is_some() || !take.unreadable.is_empty();
-            let told = take.problems.iter().map(|p| format!("{}: {p}", take.name));
-            if is_lost { lost.extend(told) } else { warnings.extend(told) }
+            let problems = take.problems.iter().map(|p| format!("{}: {p}", take.name));
+            if take.data_lost() { lost.extend(problems) } else { warnings.extend(problems) }
         }
         Ok(Answer { text: format!("{found}\n"), results: json!(found), warnings, lost, ..Answer::default() })
     }

@@ -15,7 +15,7 @@
 
 use crate::DepthImage;
 
-/// The most pixels that an image may have (64 Mi): what is larger is refused before anything is allocated.
+/// The maximum number of pixels of an image (64 Mi): a larger one is refused before anything is allocated.
 pub const MAX_PIXELS: u64 = 1 << 26;
 
 /// The name by which recordings say that depth is packed this way.
@@ -25,7 +25,7 @@ const MAGIC: &[u8; 4] = b"TDZ1";
 const HEADER_LENGTH: usize = 12;
 const ZSTD_LEVEL: i32 = 1;
 
-/// Why bytes are no depth image (or an image cannot be packed).
+/// Why bytes are not a depth image (or an image cannot be packed).
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum DepthCodecError {
     /// The bytes do not start as this codec's do.

@@ -2,23 +2,23 @@
 //!
 //! `foxglove.CompressedImage`, `foxglove.RawImage` and `foxglove.CameraCalibration` are the public Foxglove schemas, with
 //! our fields from number 1001 added to the images, so that each message carries its times and numbers itself.
-//! `toile.CompressedDepth` is `foxglove.CompressedImage` whose data is packed by [`crate::depth_codec`].
+//! `toile.CompressedDepth` is `foxglove.CompressedImage` whose data is packed by [`super::depth_codec`].
 
-use crate::protobuf::Writer;
+use super::protobuf::Writer;
 
-/// Field numbers of [`crate::message::Stamp`] in every image message.
-pub(crate) mod stamp_field {
-    pub(crate) const FRAME_INDEX: u32 = 1001;
-    pub(crate) const SENSOR: u32 = 1002;
-    pub(crate) const DEVICE_FRAME: u32 = 1003;
-    pub(crate) const LOST_BEFORE: u32 = 1004;
-    pub(crate) const DEVICE_TIME_NS: u32 = 1005;
-    pub(crate) const HOST_TIME_NS: u32 = 1006;
+/// Field numbers of [`super::message::Stamp`] in every image message.
+pub(super) mod stamp_field {
+    pub(in crate::recording) const FRAME_INDEX: u32 = 1001;
+    pub(in crate::recording) const SENSOR: u32 = 1002;
+    pub(in crate::recording) const DEVICE_FRAME: u32 = 1003;
+    pub(in crate::recording) const LOST_BEFORE: u32 = 1004;
+    pub(in crate::recording) const DEVICE_TIME_NS: u32 = 1005;
+    pub(in crate::recording) const HOST_TIME_NS: u32 = 1006;
 }
 
 /// Which schema a channel has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Schema {
+pub(super) enum Schema {
     /// JPEG or PNG colour, PNG depth.
     CompressedImage,
     /// Raw pixels: `rgb8` or `16UC1`.
@@ -52,11 +52,11 @@ struct Field {
 const TIMESTAMP: &str = ".google.protobuf.Timestamp";
 
 impl Schema {
-    pub(crate) const ALL: [Self; 4] =
+    pub(super) const ALL: [Self; 4] =
         [Self::CompressedImage, Self::RawImage, Self::CompressedDepth, Self::CameraCalibration];
 
     /// The full name, such as `foxglove.RawImage`.
-    pub(crate) fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::CompressedImage => "foxglove.CompressedImage",
             Self::RawImage => "foxglove.RawImage",
@@ -66,12 +66,12 @@ impl Schema {
     }
 
     /// The schema of that name.
-    pub(crate) fn from_name(name: &str) -> Option<Self> {
+    pub(super) fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|schema| schema.name() == name)
     }
 
     /// A serialised `FileDescriptorSet` that describes this schema and what it imports.
-    pub(crate) fn descriptor(self) -> Vec<u8> {
+    pub(super) fn descriptor(self) -> Vec<u8> {
         let (package, message) = self.name().split_once('.').unwrap_or(("toile", "Message"));
         let mut fields = self.fields();
         if self != Self::CameraCalibration {

@@ -1,72 +1,29 @@
-//! Recordings: frames of a rig as one MCAP file.
-//!
-//! What is inside (see `docs/recording.md`): a metadata record `toile.recording` with the rig as JSON; per sensor the
-//! channels `/NAME/depth/image`, `/NAME/color/image`, `/NAME/depth/calibration`, `/NAME/color/calibration`; chunks
-//! without compression (the payloads are compressed already) that each hold whole frames, with CRC and index. An MCAP
-//! message's log time is the host time, its publish time the device time, its sequence the device's frame number.
+//! Writing a recording.
 
 use std::{
     collections::BTreeMap,
     fs::{self, File, TryLockError},
     io::BufWriter,
     path::{Path, PathBuf},
-    sync::Arc,
 };
 
 use mcap::{
     records::MessageHeader,
-    write::{NoSeek, WriteOptions, Writer},
+    write::{Metadata, NoSeek, WriteOptions, Writer},
 };
 
-use crate::{
-    CaptureError, ColorImage, DepthImage, Frame, RgbImage, Rig, depth_codec,
-    files::{claim, create_parent, open_regular, part_path, sync_parent, with_suffix},
+use super::{
+    depth_codec,
     message::{ImageMessage, Stamp, encode_calibration},
+    metadata::{self, check_rig},
+    options::{DepthEncoding, RecorderOptions, RecordingSummary},
     schema::Schema,
+    stream::Stream,
 };
-
-/// Name of the metadata record that makes an MCAP file ours.
-pub(crate) const METADATA: &str = "toile.recording";
-
-/// How depth stands in the file; lossless either way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum DepthEncoding {
-    /// Packed by [`depth_codec`] in `toile.CompressedDepth` messages: small; other viewers do not show it.
-    #[default]
-    Packed,
-    /// `foxglove.RawImage` with encoding `16UC1`: what the field's viewers display; about three times larger.
-    Raw,
-}
-
-/// How to record.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RecorderOptions {
-    /// How depth stands in the file.
-    pub depth: DepthEncoding,
-    /// A chunk is closed and synced to the disk after the frame that brings it to this many bytes; a power cut loses at
-    /// most one chunk. Default 4 MiB, less than half a second of a 640×480 sensor.
-    pub chunk_bytes: usize,
-    /// Delete a `.part` file of an earlier, interrupted run (right for imports, which can be repeated). When false it is
-    /// moved to `.part.1`, `.part.2`, ...
-    pub replace_part: bool,
-}
-
-impl Default for RecorderOptions {
-    fn default() -> Self {
-        Self { depth: DepthEncoding::Packed, chunk_bytes: 4 << 20, replace_part: false }
-    }
-}
-
-/// What a finished recording holds.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RecordingSummary {
-    /// The file.
-    pub path: PathBuf,
-    /// Frames in it.
-    pub frames: u64,
-    /// Its size.
-    pub bytes: u64,
-}
+use crate::{
+    CaptureError, ColorImage, DepthImage, Frame, RgbImage, Rig,
+    files::{claim, create_parent, open_regular, part_path, sync_parent, with_suffix},
+};
 
 /// Writes a recording. It grows as `FILE.part` and becomes `FILE` in [`Self::finish`]; dropped before, the `.part` stays
 /// and can be replayed up to its last whole chunk.
@@ -80,16 +37,6 @@ pub struct Recorder {
     channels: BTreeMap<(usize, Stream), u16>,
     frames: u64,
     pending: usize,
-}
-
-/// A channel of one sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Stream {
-    Depth,
-    Color,
-    RawColor,
-    DepthCalibration,
-    ColorCalibration,
 }
 
 impl Recorder {
@@ -137,9 +84,9 @@ impl Recorder {
             self.write_calibrations(frame.device_time_ns, frame.host_time_ns)?;
         }
         if let (Some(image), Some((schema, format, data))) = (&frame.depth, &depth) {
-            let step = 2 * image.width;
-            let message = self.raw_or_compressed(frame, *schema, format, [image.width, image.height, step], data);
-            let bytes = message.encode(*schema, &self.camera_name(frame.sensor, Stream::Depth));
+            let name = self.camera_name(frame.sensor, Stream::Depth);
+            let size = [image.width, image.height, 2 * image.width];
+            let bytes = self.message(frame, *schema, (&name, format), size, data).encode(*schema);
             self.append(Stream::Depth, *schema, frame, &bytes)?;
         }
         if let Some(color) = &frame.color {
@@ -205,24 +152,25 @@ impl Recorder {
             ColorImage::Jpeg(data) | ColorImage::Png(data) => {
                 let format = if matches!(color, ColorImage::Jpeg(_)) { "jpeg" } else { "png" };
                 let schema = Schema::CompressedImage;
-                let bytes = self.raw_or_compressed(frame, schema, format, [0; 3], data).encode(schema, &name);
+                let bytes = self.message(frame, schema, (&name, format), [0; 3], data).encode(schema);
                 self.append(Stream::Color, schema, frame, &bytes)
             }
             ColorImage::Rgb(image) => {
                 let RgbImage { width, height, pixels } = image.as_ref();
                 let size = [*width, *height, 3 * width];
-                let message = self.raw_or_compressed(frame, Schema::RawImage, "rgb8", size, pixels.as_flattened());
-                let bytes = message.encode(Schema::RawImage, &name);
+                let message = self.message(frame, Schema::RawImage, (&name, "rgb8"), size, pixels.as_flattened());
+                let bytes = message.encode(Schema::RawImage);
                 self.append(Stream::RawColor, Schema::RawImage, frame, &bytes)
             }
         }
     }
 
-    fn raw_or_compressed<'a>(
+    /// The message of one image. Only raw ones say their size: columns, rows, bytes a row.
+    fn message<'a>(
         &self,
         frame: &Frame,
         schema: Schema,
-        format: &'a str,
+        (frame_id, format): (&'a str, &'a str),
         size: [u32; 3],
         data: &'a [u8],
     ) -> ImageMessage<'a> {
@@ -235,7 +183,8 @@ impl Recorder {
             host_time_ns: frame.host_time_ns,
         };
         let [width, height, step] = if schema == Schema::RawImage { size } else { [0; 3] };
-        ImageMessage { stamp, format, width, height, step, data }
+        let time_ns = Some(frame.device_time_ns);
+        ImageMessage { stamp: Some(stamp), time_ns, frame_id, format, width, height, step, data }
     }
 
     fn write_calibrations(&mut self, device_time_ns: i64, host_time_ns: i64) -> Result<(), CaptureError> {
@@ -302,39 +251,6 @@ impl Recorder {
     }
 }
 
-impl Stream {
-    fn topic(self) -> &'static str {
-        match self {
-            Self::Depth => "depth/image",
-            Self::Color => "color/image",
-            Self::RawColor => "color/raw",
-            Self::DepthCalibration => "depth/calibration",
-            Self::ColorCalibration => "color/calibration",
-        }
-    }
-
-    fn role(self) -> &'static str {
-        match self {
-            Self::Depth | Self::DepthCalibration => "depth",
-            Self::Color | Self::RawColor | Self::ColorCalibration => "color",
-        }
-    }
-}
-
-/// Rewrites the recording `path_in` as `path_out` with depth as `16UC1` images, which the field's viewers display.
-///
-/// # Errors
-/// [`CaptureError`] where one cannot be read or the other cannot be written.
-pub fn export_standard(path_in: &Path, path_out: &Path) -> Result<RecordingSummary, CaptureError> {
-    let replay = crate::Replay::open(path_in)?;
-    let options = RecorderOptions { depth: DepthEncoding::Raw, replace_part: true, ..RecorderOptions::default() };
-    let mut recorder = Recorder::create(path_out, crate::Source::rig(&replay), options)?;
-    for index in 0..replay.len() {
-        recorder.write(&replay.frame(index)?)?;
-    }
-    recorder.finish()
-}
-
 /// Moves what an interrupted run recorded out of the way.
 fn keep_part(part: &Path) -> Result<(), CaptureError> {
     let is_recording = fs::symlink_metadata(part).is_ok_and(|found| found.is_file());
@@ -351,25 +267,6 @@ fn is_in_use(part: &Path) -> bool {
     open_regular(part).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
-fn check_rig(path: &Path, rig: &Rig) -> Result<(), CaptureError> {
-    if rig.sensors.is_empty() {
-        return Err(CaptureError::format(path, "a recording needs a rig with at least one sensor"));
-    }
-    for (index, sensor) in rig.sensors.iter().enumerate() {
-        let name = &sensor.name;
-        if !sensor.depth.is_valid() || sensor.color.is_some_and(|color| !color.is_valid()) {
-            return Err(CaptureError::format(path, format!("the calibration of sensor {name} is not usable")));
-        }
-        if !(sensor.depth_scale.is_finite() && sensor.depth_scale > 0.0) {
-            return Err(CaptureError::format(path, format!("the depth scale of sensor {name} is not above 0")));
-        }
-        if rig.sensors[..index].iter().any(|other| other.name == *name) {
-            return Err(CaptureError::format(path, format!("two sensors of the rig are called {name}")));
-        }
-    }
-    Ok(())
-}
-
 type McapWriter = Writer<NoSeek<BufWriter<File>>>;
 
 fn start_writer(file: File, rig: &Rig, depth: DepthEncoding) -> Result<McapWriter, mcap::McapError> {
@@ -379,16 +276,8 @@ fn start_writer(file: File, rig: &Rig, depth: DepthEncoding) -> Result<McapWrite
         .disable_seeking(true)
         .library(concat!("toile ", env!("CARGO_PKG_VERSION")))
         .create(NoSeek::new(BufWriter::new(file)))?;
-    let rig = serde_json::to_string(rig).map_err(|error| mcap::McapError::Io(std::io::Error::other(error)))?;
-    let (depth, note) = match depth {
-        DepthEncoding::Raw => ("16UC1", "depth is foxglove.RawImage, 16UC1"),
-        DepthEncoding::Packed => {
-            (depth_codec::NAME, "depth is packed losslessly by toile; `toile export --mcap` converts it to 16UC1")
-        }
-    };
-    let entries = [("version", "1"), ("depth_encoding", depth), ("note", note), ("rig", &rig)];
-    let metadata = entries.map(|(key, value)| (key.to_string(), value.to_string())).into();
-    writer.write_metadata(&mcap::write::Metadata { name: METADATA.to_string(), metadata })?;
+    let content = metadata::content(rig, depth).map_err(|error| mcap::McapError::Io(std::io::Error::other(error)))?;
+    writer.write_metadata(&Metadata { name: metadata::NAME.to_string(), metadata: content })?;
     Ok(writer)
 }
 
@@ -397,11 +286,4 @@ fn mcap_error(path: &Path, error: mcap::McapError) -> CaptureError {
         mcap::McapError::Io(error) => CaptureError::io(path, error),
         other => CaptureError::format(path, other.to_string()),
     }
-}
-
-/// Pixels from `rgb8` bytes.
-pub(crate) fn rgb_from_bytes(width: u32, height: u32, data: &[u8]) -> Option<ColorImage> {
-    let (pixels, rest) = data.as_chunks::<3>();
-    let fits = rest.is_empty() && pixels.len() as u64 == u64::from(width) * u64::from(height);
-    fits.then(|| ColorImage::Rgb(Arc::new(RgbImage { width, height, pixels: pixels.to_vec() })))
 }

@@ -1,0 +1,73 @@
+//! What is in a recording, a folder or a subject, and whether it is healthy.
+
+mod findings;
+mod frames;
+mod problems;
+mod text;
+
+use std::{fs, path::Path};
+
+use crate::{
+    CaptureError, Layer, Replay, Subject,
+    import::{self, Format},
+};
+
+pub use findings::{Gap, Inspection, SensorInspection, SubjectInspection, TakeInspection};
+use frames::read_frames;
+use problems::problems;
+
+/// Looks through a recording, a folder of images, or all takes of a subject. Every image is decoded.
+///
+/// # Errors
+/// [`CaptureError`] where nothing at all can be read.
+pub fn inspect(path: &Path) -> Result<Inspection, CaptureError> {
+    let (subject, takes) = if Subject::exists(path) {
+        let subject = Subject::open(path)?;
+        let head = SubjectInspection { name: subject.name().to_string(), date: subject.date().to_string() };
+        (Some(head), inspect_layers(&subject))
+    } else {
+        (None, vec![inspect_take(path)?])
+    };
+    Ok(Inspection {
+        path: path.to_string_lossy().into_owned(),
+        subject,
+        healthy: takes.iter().all(|take| take.problems.is_empty()),
+        data_lost: takes.iter().any(TakeInspection::data_lost),
+        takes,
+    })
+}
+
+fn inspect_layers(subject: &Subject) -> Vec<TakeInspection> {
+    let inspect_layer = |layer: &Layer| {
+        let path = subject.take_path(layer);
+        let mut take = inspect_take(&path).unwrap_or_else(|error| TakeInspection {
+            format: Format::Mcap.to_string(),
+            unreadable: vec![error.to_string()],
+            problems: vec![error.to_string()],
+            ..TakeInspection::default()
+        });
+        take.name = layer.label();
+        take.garment = layer.garment.clone();
+        take
+    };
+    subject.layers().iter().map(inspect_layer).collect()
+}
+
+fn inspect_take(path: &Path) -> Result<TakeInspection, CaptureError> {
+    let format = import::guess(path)?;
+    let mut take = TakeInspection {
+        name: path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+        format: format.to_string(),
+        ..TakeInspection::default()
+    };
+    if format == Format::Mcap {
+        let mut replay = Replay::open(path)?;
+        take.loss = replay.lost().cloned();
+        take.bytes = fs::metadata(path).map_err(|error| CaptureError::io(path, error))?.len();
+        read_frames(&mut replay, &mut take);
+    } else {
+        read_frames(import::open(path, Some(format))?.as_mut(), &mut take);
+    }
+    take.problems = problems(&take);
+    Ok(take)
+}
