@@ -207,8 +207,9 @@ fn pipes_are_refused_at_once_and_any_folder_name_will_do() {
     }
     let name = std::ffi::OsStr::from_bytes(b"M\xfcller\x1b[2J");
     let subject = recording.folder().with_file_name(name);
-    let words = ["import".as_ref(), recording.folder().as_os_str(), "--subject".as_ref(), subject.as_os_str()];
-    exits(0, toile().args(words).args(["--layer", "body"]));
+    let mut import = toile();
+    import.arg("import").arg(recording.folder()).arg("--subject").arg(&subject).args(["--layer", "body"]);
+    exits(0, &mut import);
     let shown = toile().arg("inspect").arg(&subject).output().unwrap();
     assert!(shown.status.success() && !shown.stdout.contains(&0x1b), "{}", String::from_utf8_lossy(&shown.stdout));
 }
