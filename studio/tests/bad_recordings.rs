@@ -148,11 +148,12 @@ fn a_full_disk_at_import_leaves_nothing_half_written() {
 
 /// Starts the same import several times at once; gives how many ended well. The others were refused.
 fn at_once(words: &[Vec<String>]) -> usize {
-    let start = |words: &Vec<String>| toile().args(words).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    let start =
+        |words: &Vec<String>| toile().args(words).stdout(std::process::Stdio::piped()).spawn().expect("toile starts");
     let started: Vec<_> = words.iter().map(start).collect();
     let mut done = 0;
     for child in started {
-        let output = child.wait_with_output().unwrap();
+        let output = child.wait_with_output().expect("toile ends");
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
         match output.status.code() {
             Some(0) => done += 1,
