@@ -9,7 +9,8 @@ use common::{image_folder, record_frames, shared};
 use toile_capture::{CaptureError, LockedSubject, Recorder, RecorderOptions, Subject, import, inspect};
 
 fn add(subject: &mut LockedSubject, name: &str, frames: u64) {
-    let garment = [("jeans", "trousers"), ("02-scarf", "other")].iter().find(|g| g.0 == name).map(|g| g.1);
+    let garment =
+        [("jeans", "trousers"), ("02-scarf", "other"), ("top", "top")].iter().find(|g| g.0 == name).map(|g| g.1);
     let take = subject.next_take(name, garment).unwrap();
     record_frames(&take.path, frames, 1, 1200);
     assert_eq!(subject.accept(take).unwrap(), None);
@@ -162,7 +163,7 @@ fn broken_subjects_get_one_clear_sentence() {
         ("date = \"2026-01-01\"\n", "missing field `name`"),
         ("name = \"x\"\n[[layers]]\nname = \"../../etc\"\n", "`../../etc` is not a layer name"),
         ("name = \"x\"\n[[layers]]\nname = \"a\"\n[[layers]]\nname = \"a\"\n", "two layers are called `a`"),
-        ("name = \"x\"\n[[layers]]\nname = \"a\"\ntype = \"toga\"\n", "toga"),
+        ("name = \"x\"\n[[layers]]\nname = \"a\"\ntype = 5\n", "line 4"),
     ] {
         fs::write(temp.path().join("subject.toml"), text).unwrap();
         let error = Subject::open(temp.path()).unwrap_err().to_string();
