@@ -52,17 +52,17 @@ struct Search<'a, F> {
 }
 
 impl<F: Fn(u32) -> bool> Query for Search<'_, F> {
-    #[inline]
+    #[inline(always)]
     fn rank(&self, node: &Node) -> f32 {
         node.distance_squared(&self.p)
     }
 
-    #[inline]
+    #[inline(always)]
     fn wants(&self, rank: f32) -> bool {
         !(rank > self.limit || (rank == self.limit && self.best.is_some()))
     }
 
-    #[inline]
+    #[inline(always)]
     fn visit(&mut self, places: Range<usize>) {
         for place in places {
             if !(self.accept)(self.bvh.tree.order[place]) {

@@ -21,7 +21,7 @@ struct Overlap<'a, F> {
 }
 
 impl<F> Overlap<'_, F> {
-    #[inline]
+    #[inline(always)]
     fn overlaps(&self, lo: &Point3<f32>, hi: &Point3<f32>) -> bool {
         (0..3).all(|k| lo[k] <= self.hi[k] && self.lo[k] <= hi[k])
     }
@@ -29,17 +29,17 @@ impl<F> Overlap<'_, F> {
 
 impl<F: FnMut(u32)> Query for Overlap<'_, F> {
     /// 0 where the box overlaps, else infinite.
-    #[inline]
+    #[inline(always)]
     fn rank(&self, node: &Node) -> f32 {
         if self.overlaps(&node.lo, &node.hi) { 0.0 } else { f32::INFINITY }
     }
 
-    #[inline]
+    #[inline(always)]
     fn wants(&self, rank: f32) -> bool {
         rank == 0.0
     }
 
-    #[inline]
+    #[inline(always)]
     fn visit(&mut self, places: Range<usize>) {
         for place in places {
             let [a, b, c] = &self.bvh.corners[place];

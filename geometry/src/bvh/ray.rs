@@ -40,7 +40,7 @@ struct Cast<'a> {
 
 impl Query for Cast<'_> {
     /// Ray parameter at which the box is entered, infinite where it is missed.
-    #[inline]
+    #[inline(always)]
     fn rank(&self, node: &Node) -> f32 {
         let (mut enter, mut leave) = (0.0f32, self.limit);
         for k in 0..3 {
@@ -53,12 +53,12 @@ impl Query for Cast<'_> {
         if enter <= leave * (1.0 + 1e-5) { enter } else { f32::INFINITY }
     }
 
-    #[inline]
+    #[inline(always)]
     fn wants(&self, enter: f32) -> bool {
         enter <= self.limit && enter.is_finite()
     }
 
-    #[inline]
+    #[inline(always)]
     fn visit(&mut self, places: Range<usize>) {
         for place in places {
             let hit = triangle::ray_hit(&self.origin, &self.direction, &self.bvh.corners[place]);

@@ -13,7 +13,7 @@ pub(crate) trait Query {
     fn wants(&self, rank: f32) -> bool;
 
     /// True where the query takes the box `index` as a whole instead of looking into it.
-    #[inline]
+    #[inline(always)]
     fn takes_whole(&mut self, _index: usize) -> bool {
         false
     }
@@ -24,13 +24,12 @@ pub(crate) trait Query {
 
 impl Tree {
     /// Visits the leaves that `query` wants.
-    #[inline]
+    // Inlined with the query's methods, so that what a query keeps stays in registers.
+    #[inline(always)]
     pub(crate) fn traverse<Q: Query>(&self, query: &mut Q) {
         let mut stack = Stack::new();
-        if let Some(root) = self.nodes.first() {
-            stack.push((query.rank(root), 0));
-        }
-        while let Some((rank, n)) = stack.pop() {
+        let mut next = self.nodes.first().map(|root| (query.rank(root), 0));
+        while let Some((rank, n)) = next.take().or_else(|| stack.pop()) {
             if !query.wants(rank) || query.takes_whole(n as usize) {
                 continue;
             }
@@ -42,7 +41,7 @@ impl Tree {
             let [l, r] = node.children(n).map(|c| (query.rank(&self.nodes[c as usize]), c));
             let (near, far) = if l.0 <= r.0 { (l, r) } else { (r, l) };
             stack.push(far);
-            stack.push(near);
+            next = Some(near);
         }
     }
 }
@@ -58,12 +57,12 @@ impl Stack {
         Self { items: [(0.0, 0); 64], len: 0 }
     }
     // Median splits balance the tree, so that 64 entries are enough for more items than a u32 counts.
-    #[inline]
+    #[inline(always)]
     fn push(&mut self, item: (f32, u32)) {
         self.items[self.len] = item;
         self.len += 1;
     }
-    #[inline]
+    #[inline(always)]
     fn pop(&mut self) -> Option<(f32, u32)> {
         self.len = self.len.checked_sub(1)?;
         Some(self.items[self.len])

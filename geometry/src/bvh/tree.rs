@@ -20,7 +20,7 @@ impl Node {
         Self { lo: Point3::new(0.0, 0.0, 0.0), hi: Point3::new(0.0, 0.0, 0.0), start: 0, count: 0 };
 
     /// Squared distance from a point to the box, 0 inside.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn distance_squared(&self, p: &Point3<f32>) -> f32 {
         let mut sum = 0.0;
         for k in 0..3 {

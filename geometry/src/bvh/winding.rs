@@ -31,17 +31,17 @@ struct Winding<'a> {
 
 impl Query for Winding<'_> {
     /// Every box counts, in the tree's order.
-    #[inline]
+    #[inline(always)]
     fn rank(&self, _: &Node) -> f32 {
         0.0
     }
 
-    #[inline]
+    #[inline(always)]
     fn wants(&self, _: f32) -> bool {
         true
     }
 
-    #[inline]
+    #[inline(always)]
     fn takes_whole(&mut self, index: usize) -> bool {
         let far = &self.bvh.far_fields[index];
         let to_center = far.center - self.p;
@@ -53,7 +53,7 @@ impl Query for Winding<'_> {
         is_far
     }
 
-    #[inline]
+    #[inline(always)]
     fn visit(&mut self, places: Range<usize>) {
         self.solid_angle += places.map(|i| solid_angle(&self.p, &self.bvh.corners[i])).sum::<f64>();
     }

@@ -178,6 +178,11 @@ pub const FIELDS: &[Field] = &[
         [1.0, 1000.0],
         "At most this many Gauss-Newton steps at the finest level.",
     ),
+    choice(
+        "extract.labelling",
+        &["graph-cut", "nearest-body-vertex"],
+        "How vertices are labelled: one energy minimised by a graph cut, or by the nearest body vertex as in the seed.",
+    ),
     number(
         "extract.smoothness",
         "nats times metres",

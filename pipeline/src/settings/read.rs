@@ -59,7 +59,7 @@ fn check(path: &Path, settings: &Settings) -> Result<(), PipelineError> {
 
 fn wrong(path: &Path, text: &str, error: &Error) -> PipelineError {
     let Some(span) = error.span() else { return PipelineError::format(path, error.message()) };
-    let line = text[..span.start.min(text.len())].lines().count().max(1);
+    let line = 1 + text[..span.start.min(text.len())].matches('\n').count();
     let reason = format!("line {line}: {}", error.message().replace('\n', "; "));
     PipelineError::field(path, &field_at(text, &span), reason)
 }
