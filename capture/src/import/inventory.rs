@@ -70,9 +70,8 @@ fn is_of_the_system(name: &str) -> bool {
 pub(super) fn last_number(name: &str) -> Option<u64> {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let digits = |c: char| c.is_ascii_digit();
-    let end = stem.rfind(digits)? + 1;
-    let start = stem[..end].rfind(|c| !digits(c)).map_or(0, |at| at + 1);
-    stem[start..end].parse().ok()
+    let ending = &stem[..stem.rfind(digits)? + 1];
+    ending[ending.trim_end_matches(digits).len()..].parse().ok()
 }
 
 /// Where one frame's images are.
@@ -222,6 +221,8 @@ mod tests {
         assert_eq!(last_number("cam2_depth_0031.png"), Some(31));
         assert_eq!(last_number("7x.png"), Some(7));
         assert_eq!(last_number("depth.png"), None);
+        assert_eq!(last_number("M\u{fc}0031.png"), Some(31), "the digits may follow any character");
+        assert_eq!(last_number("7\u{8eab}.png"), Some(7));
         assert_eq!(last_number("depth.mp4"), None, "the extension's digits are no frame number");
     }
 }
