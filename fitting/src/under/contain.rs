@@ -64,7 +64,7 @@ pub(crate) fn contained(
     let neighbors = VertexNeighbors::new(start.len(), &model.triangles);
     let normals = vertex_normals(start, &model.triangles);
     let most = farthest(model, start, &normals);
-    let mut depth = vec![0.0f32; start.len()];
+    let mut depth = Depth::new(start.len());
     let mut points = start.to_vec();
     let mut margins = None;
     for _ in 0..ROUNDS {
@@ -74,16 +74,40 @@ pub(crate) fn contained(
         for (v, height) in heights.iter().enumerate() {
             let margin = margins.of(model.regions[v]);
             let unseen = if is_first { margin } else { 0.0 };
-            let more = height.map_or(unseen, |h| (h.min(BELIEVED) + margin).max(0.0));
-            depth[v] = depth[v].max((depth[v] + more).min(BY_NOISE));
+            depth.by_noise[v] += height.map_or(unseen, |h| (h.min(BELIEVED) + margin).max(0.0));
         }
-        draw_in(model, &surface, inside, &points, &normals, &mut depth);
-        soften(&mut depth, &neighbors);
-        depth.iter_mut().zip(&most).for_each(|(d, m)| *d = d.min(*m));
-        points = (0..start.len()).map(|v| start[v] - normals[v] * depth[v]).collect();
+        draw_in(model, &surface, inside, &points, &normals, &mut depth.astray);
+        depth.soften(&neighbors, &most);
+        points = (0..start.len()).map(|v| start[v] - normals[v] * depth.of(v, &most)).collect();
     }
     draw_pockets_back(model, &mut points);
     uncrossed(&model.triangles, start, unfolded(model, start, points))
+}
+
+/// How deep each vertex is moved along its normal, metres.
+struct Depth {
+    /// For heights that noise explains, and for the margins of hands and feet.
+    by_noise: Vec<f32>,
+    /// For what lies outside by more than that.
+    astray: Vec<f32>,
+}
+
+impl Depth {
+    fn new(count: usize) -> Self {
+        Self { by_noise: vec![0.0; count], astray: vec![0.0; count] }
+    }
+
+    /// Lets both fade out over the neighbours, at most `most` deep, and not deeper by noise than noise reaches.
+    fn soften(&mut self, neighbors: &VertexNeighbors, most: &[f32]) {
+        for (depth, limit) in [(&mut self.by_noise, BY_NOISE), (&mut self.astray, FARTHEST)] {
+            soften(depth, neighbors);
+            depth.iter_mut().zip(most).for_each(|(d, m)| *d = d.min(m.min(limit)));
+        }
+    }
+
+    fn of(&self, v: usize, most: &[f32]) -> f32 {
+        (self.by_noise[v] + self.astray[v]).min(most[v])
+    }
 }
 
 /// Adds to the depth of each vertex outside the scan its height over it.

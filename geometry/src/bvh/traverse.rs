@@ -27,21 +27,27 @@ impl Tree {
     // Inlined with the query's methods, so that what a query keeps stays in registers.
     #[inline(always)]
     pub(crate) fn traverse<Q: Query>(&self, query: &mut Q) {
-        let mut stack = Stack::new();
-        let mut next = self.nodes.first().map(|root| (query.rank(root), 0));
-        while let Some((rank, n)) = next.take().or_else(|| stack.pop()) {
-            if !query.wants(rank) || query.takes_whole(n as usize) {
-                continue;
-            }
-            let node = &self.nodes[n as usize];
-            if node.count > 0 {
+        let Some(root) = self.nodes.first() else { return };
+        let (mut stack, mut at) = (Stack::new(), (query.rank(root), 0));
+        loop {
+            let (rank, n) = at;
+            if query.wants(rank) && !query.takes_whole(n as usize) {
+                let node = &self.nodes[n as usize];
+                if node.count == 0 {
+                    let [left, right] = node.children(n);
+                    let l = (query.rank(&self.nodes[left as usize]), left);
+                    let r = (query.rank(&self.nodes[right as usize]), right);
+                    let (near, far) = if l.0 <= r.0 { (l, r) } else { (r, l) };
+                    stack.push(far);
+                    at = near;
+                    continue;
+                }
                 query.visit(node.items());
-                continue;
             }
-            let [l, r] = node.children(n).map(|c| (query.rank(&self.nodes[c as usize]), c));
-            let (near, far) = if l.0 <= r.0 { (l, r) } else { (r, l) };
-            stack.push(far);
-            next = Some(near);
+            match stack.pop() {
+                Some(next) => at = next,
+                None => return,
+            }
         }
     }
 }
