@@ -103,7 +103,7 @@ fn a_thickness_that_no_cloth_has_is_said_before_any_work() {
     std::fs::write(&path, format!("{text}\nthickness_mm = 11.0\n")).unwrap();
     let answer = exits(1, toile().arg("process").arg(recording.subject()));
     let message = answer.to_string();
-    assert!(message.contains("subject.toml") && message.contains("thickness_mm = 11"), "{message}");
+    assert!(message.contains("subject.toml") && message.contains("thickness_mm`: 11 is not between"), "{message}");
     assert!(!recording.subject().join("build").exists(), "nothing was fused");
 }
 
@@ -113,7 +113,7 @@ fn edits_that_cannot_be_used_are_named_and_not_kept() {
     exits(0, toile().args(recording.import("body")));
     let file = recording.folder().join("edits.json");
     for (text, says) in [
-        ("{", "no edits"),
+        ("{", "not a valid edits file"),
         (r#"{"version": 2}"#, "version 2"),
         (r#"{"version": 1, "stroke": []}"#, "stroke"),
         (r#"{"version": 1, "strokes": [{"mark": "belongs", "points": [], "radius": 0.1}]}"#, "stroke 1"),

@@ -301,6 +301,7 @@ fn a_record_changed_by_hand_is_noticed_and_built_again() {
     fs::write(&path, format!("{}9{}", &whole[..at], &whole[at..])).unwrap();
     let output = toile(&["process", subject.to_str().unwrap(), "--json"]).output().unwrap();
     let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(told["warnings"][0].as_str().is_some_and(|w| w.contains("build/layers/report.json")), "{told}");
+    let is_said = |w: &Value| w.as_str().is_some_and(|w| w.contains("build/layers/report.json"));
+    assert!(told["warnings"].as_array().unwrap().iter().any(is_said), "{told}");
     assert_eq!(fs::read_to_string(&path).unwrap(), whole);
 }
