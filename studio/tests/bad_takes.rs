@@ -116,7 +116,7 @@ fn nothing_new_something_taken_off_and_two_at_once_are_said_and_the_other_takes_
         serde_json::from_slice(&fs::read(eva.join("build/03-less/report.json")).unwrap()).unwrap();
     assert!(record["stages"]["cut"]["failures"].to_string().contains("no new garment"), "{record}");
     assert_eq!(said(&record["stages"]["pose"]["warnings"], "03-less", "taken off"), 1, "{record}");
-    let again = exits(1, toile().arg("extract").arg(&eva));
+    let again = exits(1, toile().arg("process").arg(&eva));
     assert_eq!((&again["failures"], &again["warnings"]), (&answer["failures"], &answer["warnings"]), "said each time");
 }
 

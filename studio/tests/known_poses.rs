@@ -84,10 +84,10 @@ fn a_wrong_pose_file_is_named_with_line_and_reason() {
     let dir = tempfile::tempdir().unwrap();
     let wrong = [
         ("# t tx ty tz\n1.0 0 0 0 0 0 1\n", "line 2: has 7 values"),
-        ("1.0 0 0 0 0 0 0 1\n1.1 0 0 x 0 0 0 1\n", "line 2: `x` is no finite number"),
-        ("1.0 0 0 inf 0 0 0 1\n", "line 1: `inf` is no finite number"),
+        ("1.0 0 0 0 0 0 0 1\n1.1 0 0 x 0 0 0 1\n", "line 2: `x` is not a finite number"),
+        ("1.0 0 0 inf 0 0 0 1\n", "line 1: `inf` is not a finite number"),
         ("1.0 0 0 0 0 0 0 2\n", "line 1: the rotation qx qy qz qw has length 2.000"),
-        ("soon 0 0 0 0 0 0 1\n", "line 1: `soon` is no time"),
+        ("soon 0 0 0 0 0 0 1\n", "line 1: `soon` is not a time"),
         ("# nothing\n", "holds no pose"),
         ("900.0 0 0 0 0 0 0 1\n", "no known pose within 5 ms"),
     ];
