@@ -88,7 +88,7 @@ fn what_is_said_by_hand_of_a_body_is_heeded() {
     assert!((joint("leftHand")[0] - expected.x).abs() < 1e-6, "{:?}, not {expected}", joint("leftHand"));
     for (text, says) in [
         (r#"{"version": 1, "landmarks": {"navel": [0, 3, 0]}}"#, "navel is more than 30 mm"),
-        (r#"{"version": 1, "landmarks": {"nabel": [0, 1, 0]}}"#, "no nabel"),
+        (r#"{"version": 1, "landmarks": {"nabel": [0, 1, 0]}}"#, "no landmark nabel"),
         (r#"{"version": 1, "joint": "affine"}"#, "joint"),
         (r#"{"version": 2}"#, "version 2"),
     ] {
