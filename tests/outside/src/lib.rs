@@ -5,7 +5,7 @@
 //! that was meant to run it.
 //!
 //! ```
-//! let Some(validator) = toile_outside::program("no-such-program") else {
+//! let Some(shell) = toile_outside::program("sh") else {
 //!     return; // said, or failed
 //! };
 //! ```
