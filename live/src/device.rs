@@ -48,7 +48,7 @@ impl FromStr for Device {
         match (kind, rest) {
             ("synthetic", None) => Ok(Self::Synthetic(1)),
             ("synthetic", Some(seed)) => {
-                seed.parse().map(Self::Synthetic).map_err(|_| format!("`{seed}` is no seed; give a whole number"))
+                seed.parse().map(Self::Synthetic).map_err(|_| format!("`{seed}` is not a seed: give a whole number"))
             }
             ("replay", Some(file)) => Ok(Self::Replay(file.into())),
             ("kinect1", serial) => Ok(Self::Kinect1(serial.map(String::from))),

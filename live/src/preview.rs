@@ -17,13 +17,13 @@ use crate::{stop::Pace, turn::Turn};
 const ROOM: usize = 8;
 /// Frames that are kept until somebody is seen to move.
 const MOST_KEPT: usize = 96;
-/// Somebody is looked for when there are so many frames, and at every doubling.
+/// The preview looks for a person once this many frames have arrived, and again at every doubling.
 const FIRST_LOOK: usize = 12;
 /// Voxels of the preview, metres: eight times fewer than the scan's.
 const VOXEL: f64 = 0.008;
 /// So many frames in a row that cannot be placed start the preview anew.
 const LOST: usize = 12;
-/// A sensor that gave no depth while so many frames came from others is silent.
+/// A sensor that gave no depth while this many frames came from others counts as silent.
 const QUIET: u64 = 90;
 
 /// What the preview knows.

@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Frames that may wait for the disk: ten seconds of a Kinect. Only beyond that does the device itself lose frames,
-/// which its own numbers tell.
+/// which its own numbers show.
 const ROOM: usize = 300;
 /// How often the line is written, and the disk asked.
 const LINE_EVERY: Duration = Duration::from_millis(250);
@@ -79,7 +79,7 @@ pub fn record(
     })
 }
 
-/// Asks the source for frames until it ends or is told to.
+/// Asks the source for frames until it ends, or until it is asked to stop.
 fn run_camera(source: &mut dyn Source, sender: &SyncSender<Result<Frame, CaptureError>>, ends: &AtomicBool) {
     while !ends.load(Ordering::Acquire) {
         let next = match source.next_frame() {

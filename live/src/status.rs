@@ -104,7 +104,7 @@ fn disk(left: u64, rate: f64) -> String {
     format!("{:.0} GB left", left as f64 / 1e9)
 }
 
-/// Bytes that may still be written beside `path`; `None` where the system does not tell.
+/// Bytes that may still be written beside `path`; `None` where the system does not say.
 pub fn disk_left(path: &Path) -> Option<u64> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let told = rustix::fs::statvfs(folder).ok()?;

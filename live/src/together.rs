@@ -19,7 +19,7 @@ const ROOM: usize = 30;
 
 /// Sources that record together.
 ///
-/// Each keeps its own clock and frame numbers. One that fails is told once and the others go on; the end is when all
+/// Each keeps its own clock and frame numbers. One that fails is reported once, and the others go on; the end is when all
 /// have ended.
 pub struct Together {
     rig: Rig,

@@ -73,7 +73,7 @@ impl Turn {
         self.angle() >= TAU + OVERLAP
     }
 
-    /// True where the turn came round as far as the preview can tell: within 5°.
+    /// True where the turn came round as far as the preview can measure it: within 5°.
     pub fn came_round(&self) -> bool {
         self.angle() >= TAU - 0.09
     }

@@ -9,7 +9,7 @@
 //! - [`Record`]: what `report.json` says of a step; a step is skipped while its record holds;
 //! - [`Settings`]: of all stages, from `toile.toml`;
 //! - [`Run`]: one run over one subject; [`Folders`]: where its files lie;
-//! - [`Observer`]: who is told how far a run is.
+//! - [`Observer`]: the receiver of a run's progress.
 //!
 //! A run can stop anywhere and go on later with the same result.
 

@@ -1,4 +1,4 @@
-//! Who is told how far a run is.
+//! The receiver of a run's progress.
 
 /// Hears how far a run is. Costs are expected seconds; only their proportions matter.
 ///

@@ -95,7 +95,7 @@ impl<'a> Run<'a> {
         layer.garment.as_deref().or_else(by_name)?.parse().ok()
     }
 
-    /// Thickness of the cloth of the garment that take `n` added, millimetres, where it is told.
+    /// Thickness of the cloth of the garment that take `n` added, millimetres, where `subject.toml` gives it.
     pub fn thickness_mm(&self, n: usize) -> Option<f32> {
         self.subject.as_ref()?.layers().get(n)?.thickness_mm
     }

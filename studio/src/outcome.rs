@@ -1,4 +1,4 @@
-//! How a command ended, and how that is told to people, machines and the shell.
+//! How a command ended, and how that is reported to people, machines and the shell.
 
 use serde_json::{Value, json};
 use toile_capture::printable_path;

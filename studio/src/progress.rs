@@ -157,7 +157,7 @@ fn bar() -> ProgressBar {
     bar
 }
 
-/// "about 12 s left", or nothing while too little is done to tell.
+/// "about 12 s left", or nothing while too little is done for an estimate.
 fn time_left(elapsed: f64, done: f64, whole: f64) -> String {
     if done < 0.02 * whole || elapsed < 1.0 || done <= 0.0 {
         return String::new();

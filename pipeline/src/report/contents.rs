@@ -57,7 +57,7 @@ pub struct Contents {
 pub struct Figures {
     /// Names of the layers.
     pub layers: Vec<String>,
-    /// What is told, and its value for each layer.
+    /// A name, and its value for each layer.
     pub rows: Vec<(&'static str, Vec<String>)>,
 }
 

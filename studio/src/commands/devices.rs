@@ -97,7 +97,7 @@ fn tell(mut answer: Answer, usb: &[UsbCamera], webcams: Vec<(u32, String)>, vide
     answer
 }
 
-/// Nodes of cameras that are told with their USB device (also those that the kernel's own Kinect driver makes), and
+/// Nodes of cameras that are listed with their USB device (also those that the kernel's own Kinect driver makes), and
 /// nodes without pictures.
 fn nodes_told_already(video: &dyn Video) -> BTreeSet<PathBuf> {
     let is_driven = |info: &NodeInfo| {

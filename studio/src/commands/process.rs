@@ -49,7 +49,7 @@ impl Process {
     /// Runs the command.
     ///
     /// # Errors
-    /// [`StudioError`] where the motion cannot be read; a subject that fails is told in the answer.
+    /// [`StudioError`] where the motion cannot be read; a subject that fails is named in the answer.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         let options = Options {
             motion: motion_choice(self.motion.as_deref()),
@@ -61,7 +61,7 @@ impl Process {
     }
 }
 
-/// Processes subjects one after the other, past failed ones, and tells of all in a table.
+/// Processes subjects one after the other, past failed ones, and lists all of them in a table.
 ///
 /// # Errors
 /// [`StudioError`] where the options are wrong for every subject.

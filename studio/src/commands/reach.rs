@@ -8,7 +8,7 @@ use toile_pipeline::{Goal, MotionChoice, Options, Remarks, Summary, process};
 
 use crate::{StudioError, outcome::Answer, session::Session};
 
-/// Takes one subject to a goal and tells which files there are now.
+/// Takes one subject to a goal and says which files there are now.
 pub(super) fn reach(subject: &Path, goal: Goal, options: &Options, session: &Session) -> Result<Answer, StudioError> {
     let summary = process(subject, goal, options, session.progress.as_ref())?;
     let text = summary.files.iter().map(|f| format!("{}\n", printable_path(f))).collect();
