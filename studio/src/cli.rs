@@ -32,7 +32,7 @@ pub struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Bring a recorded folder into a subject as its next take
+    /// Import a recorded folder into a subject as its next take
     Import(commands::import::Import),
     /// Record a take from a camera, and see how much of the subject was seen
     Capture(commands::capture::Capture),
@@ -44,7 +44,7 @@ pub enum Command {
     Fit(commands::fit::Fit),
     /// Measure the body as a tailor does (ISO 8559-1)
     Measure(commands::measure::Measure),
-    /// Cut the garments out of the dressed scans and stack them
+    /// Extract the garments from the dressed scans and stack them
     Extract(commands::extract::Extract),
     /// Correct a garment by hand: strokes that belong to it or do not, and lines that its hem follows
     Edit(commands::edit::Edit),

@@ -29,7 +29,7 @@ Examples:
   toile devices
   sudo toile devices --install-udev-rules";
 
-/// Tell which cameras are plugged in, at which speed, and what is wrong with them
+/// List which cameras are plugged in, at which speed, and what is wrong with them
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Devices {
@@ -68,7 +68,7 @@ fn list() -> Answer {
     tell(answer, &usb, webcams, &KernelVideo::default())
 }
 
-/// Tells every camera once: as what `toile capture` drives it as.
+/// Lists every camera once, as what `toile capture` drives it as.
 fn tell(mut answer: Answer, usb: &[UsbCamera], webcams: Vec<(u32, String)>, video: &dyn Video) -> Answer {
     let cameras = realsense::list(video).unwrap_or_else(|e| warn(&mut answer, &e));
     let mut told = nodes_told_already(video);

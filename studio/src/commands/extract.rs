@@ -17,7 +17,7 @@ Examples:
   toile extract anna
   toile extract anna trousers      only up to this layer";
 
-/// Cut the garments out of the dressed scans and stack them
+/// Extract the garments from the dressed scans and stack them
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Extract {

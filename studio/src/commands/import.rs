@@ -23,7 +23,7 @@ Examples:
   toile import takes/trousers --subject anna --layer trousers --type trousers
   toile import takes/again    --subject anna --layer trousers --retake";
 
-/// Bring a recorded folder into a subject as its next take
+/// Import a recorded folder into a subject as its next take
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Import {

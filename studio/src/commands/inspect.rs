@@ -14,7 +14,7 @@ Examples:
   toile inspect anna
   toile inspect anna/takes/00-body.mcap --json";
 
-/// Tell what is in a recording, a folder or a subject, and whether it is healthy
+/// Show what is in a recording, a folder or a subject, and whether it is healthy
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Inspect {
