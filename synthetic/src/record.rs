@@ -8,7 +8,7 @@ use toile_character::GarmentType;
 use crate::{SyntheticError, subject::Subject, take::Take, truth};
 
 /// Records every take of a subject into a new subject folder: subject.toml and takes/NN-layer.mcap. Where `truth` names a
-/// folder, what is true of the subject is written there ([`truth`](crate::truth)).
+/// folder, what is true of the subject is written there ([`truth`]).
 ///
 /// # Errors
 /// [`SyntheticError`] where `folder` is a subject already, or a file cannot be written.

@@ -1,4 +1,4 @@
-//! Import: folders of images that others recorded, as a [`Source`].
+//! Import: folders of images that others recorded, as a [`Source`](crate::Source).
 //!
 //! | Format | Layout |
 //! |---|---|

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::Loss;
 
-/// What [`inspect`] found.
+/// What [`inspect`](crate::inspect()) found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// What was looked at.

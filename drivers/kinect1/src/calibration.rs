@@ -82,7 +82,7 @@ impl Calibration {
         self.reference / (2.0 * self.pixel)
     }
 
-    /// Millimetres along +Z of every raw value; 0 where there is no depth or it is beyond [`MAX_MM`].
+    /// Millimetres along +Z of every raw value; 0 where there is no depth or it is beyond `MAX_MM`.
     pub fn mm_from_raw(&self) -> Vec<u16> {
         (0..=NO_DEPTH).map(|raw| if raw == NO_DEPTH { 0 } else { self.mm(raw) }).collect()
     }

@@ -53,7 +53,7 @@ impl Camera {
 }
 
 /// The cameras that are plugged in, in the order of their first nodes. Nodes that cannot be opened are left out
-/// ([`refusal`] says why).
+/// (`refusal` says why).
 ///
 /// # Errors
 /// [`RealsenseError::Transport`] where nodes cannot be listed at all.

@@ -27,7 +27,7 @@ struct Piece {
 }
 
 /// The zero surface where every corner of a cell has at least `min_weight`. Counter-clockwise from outside, vertices
-/// shared, with normals, colours (where the field has them) and the attribute [`WEIGHT`].
+/// shared, with normals, colours (where the field has them) and the attribute `WEIGHT`.
 pub fn extract_surface(tsdf: &Tsdf, min_weight: u16) -> Mesh {
     tidy(&crossings(tsdf, min_weight))
 }

@@ -99,7 +99,7 @@ impl Tsdf {
         }
     }
 
-    /// Metres a unit of [`Voxel::sdf`].
+    /// Metres a unit of `Voxel::sdf`.
     #[inline]
     pub fn unit(&self) -> f32 {
         self.truncation / f32::from(i16::MAX)

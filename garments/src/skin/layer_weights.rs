@@ -21,7 +21,7 @@ const FACING: f32 = 0.3;
 
 /// Gives each of the `layers` (inside to outside, stacked in `pose0`, with their `weights`) the weights of the nearest
 /// layer below where that is close. Layers over bare body keep their own weights, and so does what hangs free
-/// ([`FREE_PART`]), as far as it can bear a stride: see [`limit_stretch`].
+/// ([`FREE_PART`]), as far as it can bear a stride: see `limit_stretch`.
 ///
 /// # Errors
 /// [`GarmentError::Mismatch`] where a layer does not have as many weights as vertices.

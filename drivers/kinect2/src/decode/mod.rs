@@ -110,7 +110,7 @@ impl Decoder {
     /// Decodes a packet.
     ///
     /// # Errors
-    /// [`Kinect2Error::Packet`] where it has another length than [`PACKET_BYTES`].
+    /// [`Kinect2Error::Packet`] where it has another length than `PACKET_BYTES`.
     pub fn decode(&mut self, packet: &[u8]) -> Result<Decoded, Kinect2Error> {
         let (rows, rest) = packet.as_chunks::<ROW_BYTES>();
         if rows.len() != 10 * ROWS || !rest.is_empty() {

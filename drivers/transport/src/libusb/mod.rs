@@ -1,6 +1,6 @@
 //! The real bus, through libusb.
 //!
-//! A thread of its own (`event_loop`) takes finished transfers from the kernel; [`device::LibusbDevice`] is an open
+//! A thread of its own (`event_loop`) takes finished transfers from the kernel; `LibusbDevice` is an open
 //! device; `transfer` is the crate's only unsafe code.
 
 mod device;
