@@ -55,15 +55,50 @@ impl Query for Winding<'_> {
 
     #[inline(always)]
     fn visit(&mut self, places: Range<usize>) {
-        self.solid_angle += places.map(|i| solid_angle(&self.p, &self.bvh.corners[i])).sum::<f64>();
+        self.solid_angle += solid_angle(self.bvh.corners[places].iter().map(|c| HalfAngle::of(&self.p, c)));
     }
 }
 
-/// Signed solid angle of a triangle (van Oosterom and Strackee 1983).
-fn solid_angle(p: &Point3<f32>, corners: &[Point3<f32>; 3]) -> f64 {
-    let [a, b, c] = corners.map(|q| (q - p).cast::<f64>());
-    let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-    let det = a.dot(&b.cross(&c));
-    let div = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-    2.0 * det.atan2(div)
+/// Half the signed solid angle of a triangle, by its sine and cosine times a positive factor.
+#[derive(Clone, Copy)]
+struct HalfAngle {
+    sine: f64,
+    cosine: f64,
+}
+
+impl HalfAngle {
+    /// Seen from `p` (van Oosterom and Strackee 1983).
+    #[inline(always)]
+    fn of(p: &Point3<f32>, corners: &[Point3<f32>; 3]) -> Self {
+        let [a, b, c] = corners.map(|q| (q - p).cast::<f64>());
+        let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+        let cosine = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+        Self { sine: a.dot(&b.cross(&c)), cosine }
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        Self {
+            sine: self.sine * other.cosine + self.cosine * other.sine,
+            cosine: self.cosine * other.cosine - self.sine * other.sine,
+        }
+    }
+}
+
+/// The sum of all solid angles. Two halves below a right angle stay below a half turn together, so that they need one
+/// arc tangent, not two.
+#[inline(always)]
+fn solid_angle(halves: impl Iterator<Item = HalfAngle>) -> f64 {
+    let (mut sum, mut open) = (0.0, None::<HalfAngle>);
+    for half in halves {
+        match open.take() {
+            _ if half.cosine <= 0.0 => sum += half.sine.atan2(half.cosine),
+            None => open = Some(half),
+            Some(first) => {
+                let both = first.plus(half);
+                sum += both.sine.atan2(both.cosine);
+            }
+        }
+    }
+    2.0 * (sum + open.map_or(0.0, |o| o.sine.atan2(o.cosine)))
 }

@@ -46,11 +46,13 @@ impl Corners {
     }
 
     /// True where one triangle alone has the edge.
+    #[inline]
     pub(super) fn is_single(&self, p: u32, q: u32) -> bool {
         self.triangles_at(p).filter(|&t| self.triangles[t as usize].contains(&q)).take(2).count() == 1
     }
 
     /// Triangles alive at a vertex.
+    #[inline]
     pub(super) fn triangles_at(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
         let mut corner = self.head[v as usize];
         std::iter::from_fn(move || {

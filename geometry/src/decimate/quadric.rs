@@ -22,6 +22,7 @@ impl Quadric {
     }
 
     /// Adds the squared distance to a point.
+    #[inline]
     pub(super) fn add_point(&mut self, p: &Point3<f64>, weight: f64) {
         for k in [0, 3, 5] {
             self.a[k] += weight;
@@ -30,6 +31,7 @@ impl Quadric {
         self.c += weight * p.coords.norm_squared();
     }
 
+    #[inline]
     pub(super) fn plus(&self, other: &Self) -> Self {
         Self {
             a: std::array::from_fn(|k| self.a[k] + other.a[k]),
@@ -38,10 +40,12 @@ impl Quadric {
         }
     }
 
+    #[inline]
     pub(super) fn trace(&self) -> f64 {
         self.a[0] + self.a[3] + self.a[5]
     }
 
+    #[inline]
     pub(super) fn at(&self, p: &Point3<f64>) -> f64 {
         let [xx, xy, xz, yy, yz, zz] = self.a;
         let (x, y, z) = (p.x, p.y, p.z);
@@ -50,6 +54,7 @@ impl Quadric {
     }
 
     /// The inverse of the matrix part by cofactors; `None` where it is singular.
+    #[inline]
     pub(super) fn inverse(&self) -> Option<Matrix3<f64>> {
         let [xx, xy, xz, yy, yz, zz] = self.a;
         let (cxx, cxy, cxz) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
@@ -62,6 +67,7 @@ impl Quadric {
     }
 
     /// The point with the minimum error, given the matrix part's inverse.
+    #[inline]
     pub(super) fn minimum(&self, inverse: &Matrix3<f64>) -> Point3<f64> {
         Point3::from(-(inverse * Vector3::from(self.b)))
     }
