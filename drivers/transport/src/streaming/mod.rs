@@ -2,6 +2,8 @@
 
 mod driver;
 mod numbering;
+mod transfers;
 
 pub use driver::{Progress, Streaming, Streams};
 pub use numbering::Numbering;
+pub use transfers::next_transfer;
