@@ -27,8 +27,8 @@ pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, Captu
     };
     let camera = camera_file::read(&camera_path)?;
     let color_name = ["color", "rgb"].into_iter().find(|name| listing.folders.iter().any(|folder| folder == name));
-    let depth = Images::list(path.join("depth"), DEPTH_EXTENSIONS)?;
-    let color = color_name.map(|name| Images::list(path.join(name), COLOR_EXTENSIONS)).transpose()?;
+    let depth = Images::list(&path.join("depth"), DEPTH_EXTENSIONS)?;
+    let color = color_name.map(|name| Images::list(&path.join(name), COLOR_EXTENSIONS)).transpose()?;
     let is_timed = matches!(depth, Images::Timed(_));
     let mut entries = match (depth, color) {
         (Images::Timed(depth), None) => pair_by_time(depth, Vec::new()),
@@ -60,13 +60,13 @@ enum Images {
 }
 
 impl Images {
-    fn list(folder: PathBuf, extensions: &[&str]) -> Result<Self, CaptureError> {
-        let listing = Listing::read(&folder)?;
-        if let Some(timed) = named_by_time(&folder, &listing, extensions)? {
+    fn list(folder: &Path, extensions: &[&str]) -> Result<Self, CaptureError> {
+        let listing = Listing::read(folder)?;
+        if let Some(timed) = named_by_time(folder, &listing, extensions)? {
             return Ok(Self::Timed(timed));
         }
         let number = |name: &str| last_number(name).filter(|_| has_extension(name, extensions));
-        listing.numbered(&folder, number).map(Self::Numbered)
+        listing.numbered(folder, number).map(Self::Numbered)
     }
 }
 

@@ -70,7 +70,7 @@ fn is_of_the_system(name: &str) -> bool {
 pub(super) fn last_number(name: &str) -> Option<u64> {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let digits = |c: char| c.is_ascii_digit();
-    let ending = &stem[..stem.rfind(digits)? + 1];
+    let ending = &stem[..=stem.rfind(digits)?];
     ending[ending.trim_end_matches(digits).len()..].parse().ok()
 }
 

@@ -33,8 +33,8 @@ impl Kinect1 {
         device.claim(0, u8::from(info.product == KINECT_FOR_WINDOWS))?;
         let mut commands = Commands::new(settings.command_limit);
         let calibration = commands.calibration(&mut *device)?;
-        let streaming = Kinect1Streams::start(device, commands, &calibration, settings.clone())?;
-        let rig = rig(&info, serial, &streaming.streams().registration, &settings);
+        let streaming = Kinect1Streams::start(device, commands, &calibration, settings)?;
+        let rig = rig(&info, serial, &streaming.streams().registration, &streaming.streams().settings);
         Ok(Self { streaming, calibration, rig })
     }
 

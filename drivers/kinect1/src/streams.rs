@@ -35,7 +35,7 @@ const TICKS_PER_SECOND: u32 = 60_000_000;
 pub(crate) struct Kinect1Streams {
     device: Box<dyn UsbDevice>,
     commands: Commands,
-    settings: Settings,
+    pub(crate) settings: Settings,
     mm_from_raw: Vec<u16>,
     pub(crate) registration: Registration,
     depth: Assembler,

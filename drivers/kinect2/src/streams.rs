@@ -181,7 +181,7 @@ impl Kinect2Streams {
                 return None;
             }
         };
-        let nothing = [0.0; COLUMNS * ROWS];
+        let nothing = if depth_mm.is_none() { vec![0.0; COLUMNS * ROWS] } else { Vec::new() };
         let image = match self.settings.color {
             ColorMode::Full => unmirrored(pixels),
             _ => self.registration.register(depth_mm.unwrap_or(&nothing), &pixels),
