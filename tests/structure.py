@@ -12,6 +12,7 @@ files, `name(` is a call. Test modules, tests/, benches/, examples/ and generate
 """
 import argparse
 import collections
+import itertools
 import os
 import re
 import statistics
@@ -43,10 +44,16 @@ def members():
     return [n for n in re.findall(r'"([^"]+)"', names) if n not in ("drivers/v4l2-sys", "tests")]
 
 
-def blank(text):
-    """The text with comments, strings and character literals replaced by spaces; line breaks stay."""
-    pattern = r'//[^\n]*|/\*.*?\*/|r(#*)".*?"\1|b?"(?:\\.|[^"\\])*"|b?\'(?:\\.[^\']*|[^\\\'\n])\''
-    return re.sub(pattern, lambda m: re.sub(r"[^\n]", " ", m.group(0)), text, flags=re.S)
+def spaces(match):
+    """As many spaces as what was matched has characters; line breaks stay."""
+    return re.sub(r"[^\n]", " ", match.group(0))
+
+
+def blank(text, strings=True):
+    """The text with comments, and where `strings` is set also strings and character literals, replaced by spaces."""
+    literal = r'(?P<literal>r(?P<hashes>#*)".*?"(?P=hashes)|b?"(?:\\.|[^"\\])*"|b?\'(?:\\.[^\']*|[^\\\'\n])\')'
+    replace = lambda m: spaces(m) if strings or m.group("literal") is None else m.group(0)
+    return re.sub(rf"//[^\n]*|/\*.*?\*/|{literal}", replace, text, flags=re.S)
 
 
 def closing(text, start):
@@ -231,27 +238,32 @@ def chain(files, start, end):
     return None
 
 
+def code_lines(file):
+    """Lines that count as code, with their numbers: no comments, `use` declarations, or lines of brackets alone."""
+    text = without_tests(blank(file.raw, strings=False))
+    text = re.sub(r"^[ \t]*(?:pub(?:\([^)]*\))?\s+)?use\s[^;]*;", spaces, text, flags=re.M)
+    lines = [(n, re.sub(r"\s+", " ", line).strip()) for n, line in enumerate(text.splitlines(), 1)]
+    return [(n, line) for n, line in lines if re.search(r"\w", line)]
+
+
 def duplicates(files):
     """Runs of code lines that stand in two places: (lines, place, place)."""
     places = collections.defaultdict(list)
-    kept = {}
-    for f in files:
-        lines = [(n, re.sub(r"\s+", " ", line).strip()) for n, line in enumerate(f.code.splitlines(), 1)]
-        kept[f.path] = [(n, line) for n, line in lines if re.search(r"\w\w", line) and not line.startswith(("use ", "pub use ", "#["))]
-        for i in range(len(kept[f.path]) - DUPLICATE_LINES + 1):
-            window = kept[f.path][i:i + DUPLICATE_LINES]
-            places["\n".join(line for _, line in window)].append((f.path, i))
+    kept = {f.path: code_lines(f) for f in files}
+    for path, lines in kept.items():
+        for i in range(len(lines) - DUPLICATE_LINES + 1):
+            window = lines[i:i + DUPLICATE_LINES]
+            places["\n".join(line for _, line in window)].append((path, i))
     covered, found = set(), []
     for where in places.values():
-        for (a, i), (b, j) in zip(where, where[1:]):
+        for (a, i), (b, j) in itertools.combinations(where, 2):
             if (a, i, b, j) in covered:
                 continue
             length = 0
             while i + length < len(kept[a]) and j + length < len(kept[b]) and kept[a][i + length][1] == kept[b][j + length][1]:
                 covered.add((a, i + length, b, j + length))
                 length += 1
-            if a != b or abs(i - j) >= length:
-                found.append((length, f"{short(a)}:{kept[a][i][0]}", f"{short(b)}:{kept[b][j][0]}"))
+            found.append((length, f"{short(a)}:{kept[a][i][0]}", f"{short(b)}:{kept[b][j][0]}"))
     return sorted(found, reverse=True)
 
 

@@ -49,14 +49,14 @@ pub fn walk(settings: &WalkSettings) -> Result<Bvh, AnimationError> {
     check(settings)?;
     let cycle = 120.0 / settings.cadence;
     let gait = Gait::new(settings.speed * cycle);
-    let height = pelvis_height(&gait);
+    let height = pelvis_height(gait);
     // The last pose closes the cycle.
     let count = (settings.cycles as f64 * cycle * settings.rate).round() as usize + 1;
     let frames = (0..count)
         .map(|i| {
             let phase = i as f64 / settings.rate / cycle;
             let travel = if settings.in_place { 0.0 } else { phase * gait.stride };
-            channels(&Moment::new(&gait, height, settings.arm_spread, phase), travel)
+            channels(&Moment::new(gait, height, settings.arm_spread, phase), travel)
         })
         .collect();
     let (joints, frame_time) = (walker::joints(), 1.0 / settings.rate);

@@ -252,9 +252,9 @@ fn an_unknown_skeleton_is_named() {
 
 // ------------------------------------------------------------------------------------------- real captures
 
-/// The motion captures of the private test data.
-fn captures() -> Vec<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real/motion");
+/// The motion captures among the test data from outside; `None` where they are missing, which is said.
+fn captures() -> Option<Vec<PathBuf>> {
+    let root = toile_outside::data("real/motion")?;
     let list = |folder: &Path| -> Vec<PathBuf> {
         let entries = std::fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
         entries.map(|e| e.unwrap().path()).collect()
@@ -262,7 +262,7 @@ fn captures() -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = list(&root).iter().filter(|p| p.is_dir()).flat_map(|p| list(p)).collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "bvh"));
     files.sort();
-    files
+    Some(files)
 }
 
 /// Limb directions of the source by the names that the report gives, one row a frame.
@@ -291,9 +291,8 @@ fn fitted(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Rotation3<f64> {
 }
 
 #[test]
-#[ignore = "needs the private motion captures"]
 fn limbs_of_real_captures_point_where_the_source_points() {
-    let files = captures();
+    let Some(files) = captures() else { return };
     let person = person();
     assert_eq!(files.len(), 16);
     for file in files {
@@ -318,9 +317,8 @@ fn limbs_of_real_captures_point_where_the_source_points() {
 }
 
 #[test]
-#[ignore = "needs the private motion captures"]
 fn feet_of_real_captures_stand_on_the_floor_and_do_not_slide() {
-    let files = captures();
+    let Some(files) = captures() else { return };
     let person = person();
     for file in files {
         let bvh = bvh::read(&file).unwrap();
@@ -362,9 +360,8 @@ fn sliding(placed: &[Vec<nalgebra::Point3<f64>>], height: &impl Fn(usize, Joint)
 }
 
 #[test]
-#[ignore = "needs the private motion captures"]
 fn one_capture_in_units_and_metres_is_one_motion() {
-    let files = captures();
+    let Some(files) = captures() else { return };
     let read =
         |name: &str| bvh::read(files.iter().find(|f| f.file_stem().is_some_and(|s| s == name)).unwrap()).unwrap();
     let (units, mut metres) = (carried(&read("131_01")), carried(&read("scaled_131_01")));

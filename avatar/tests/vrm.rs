@@ -52,7 +52,7 @@ fn bones_are_all_there_once_and_hang_together() {
         let parents: Vec<usize> = (0..file["nodes"].as_array().unwrap().len())
             .filter(|i| file["nodes"][i]["children"].as_array().is_some_and(|c| c.contains(&node.into())))
             .collect();
-        assert_eq!(parents, joint.parent().map(|p| p.index()).into_iter().collect::<Vec<_>>());
+        assert_eq!(parents, joint.parent().map(Joint::index).into_iter().collect::<Vec<_>>());
     }
 }
 

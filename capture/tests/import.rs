@@ -70,7 +70,7 @@ fn an_unreadable_frame_is_left_out_and_named() {
 #[test]
 fn bad_folders_get_one_clear_sentence() {
     type Damage = fn(&Path);
-    let cases: [(&str, Damage); 12] = [
+    let cases: [(&str, Damage); 13] = [
         ("camera.json: is missing", |f| fs::remove_file(f.join("camera.json")).unwrap()),
         ("field `fx` is missing", |f| edit(f, "\"fx\"", "\"focal\"")),
         ("field `width` must be a number", |f| edit(f, "24", "\"24\"")),
@@ -81,7 +81,8 @@ fn bad_folders_get_one_clear_sentence() {
             fs::write(f.join("timestamps.txt"), "1\n2\n").unwrap();
         }),
         ("line 2 is not a time", |f| fs::write(f.join("timestamps.txt"), "1\nx\n3\n").unwrap()),
-        ("line 3 is not later", |f| fs::write(f.join("timestamps.txt"), "1\n5\n5\n").unwrap()),
+        ("line 3 is earlier", |f| fs::write(f.join("timestamps.txt"), "1\n5\n4\n").unwrap()),
+        ("2 of 3 frames have the same time", |f| fs::write(f.join("timestamps.txt"), "5\n5\n5\n").unwrap()),
         ("must be a 16-bit grey PNG", |f| {
             for i in 0..3 {
                 image::GrayImage::new(24, 16).save(f.join(format!("depth/{i:06}.png"))).unwrap();
@@ -303,6 +304,25 @@ fn mixed_names_are_asked_about_and_what_is_not_a_number_is_named() {
     fs::write(folder.join("timestamps.txt"), "\n").unwrap();
     let error = import::open(&folder, None).err().unwrap().to_string();
     assert!(error.contains("has 0 lines, but there are 3 frames"), "{error}");
+}
+
+/// As loggers write that stamp a picture twice: the time is that of one frame, and the other alone is left out.
+#[test]
+fn a_time_that_stands_twice_costs_one_frame_and_is_said() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 5);
+    fs::write(folder.join("timestamps.txt"), "100\n200\n\n200\n400\n500\n").unwrap();
+    let out = temp.path().join("out.mcap");
+    let report = import_to(&folder, &out).unwrap();
+    assert_eq!((report.frames, report.lost, report.lost_data()), (4, 0, true));
+    let [said] = &report.unreadable[..] else { panic!("{:?}", report.unreadable) };
+    assert!(
+        said.contains("timestamps.txt: line 4 has the same time") && said.contains("frame 2 is left out"),
+        "{said}"
+    );
+    let frames = all_frames(&mut Replay::open(&out).unwrap()).unwrap();
+    let kept = frames.iter().map(|f| (f.device_time_ns, f.depth.as_ref().unwrap().at(0, 0), f.lost_before));
+    assert_eq!(kept.collect::<Vec<_>>(), [(100, 1000, 0), (200, 1001, 0), (400, 1003, 1), (500, 1004, 0)]);
 }
 
 #[test]

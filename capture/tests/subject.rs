@@ -6,7 +6,7 @@ mod common;
 use std::{fs, path::Path};
 
 use common::{image_folder, record_frames, shared};
-use toile_capture::{CaptureError, LockedSubject, Recorder, RecorderOptions, Subject, import, inspect};
+use toile_capture::{CaptureError, Layer, LockedSubject, Recorder, RecorderOptions, Subject, import, inspect};
 
 fn add(subject: &mut LockedSubject, name: &str, frames: u64) {
     let garment =
@@ -30,7 +30,7 @@ fn takes_are_numbered_and_come_back() {
     drop(subject);
     let again = LockedSubject::open_or_create(&folder).unwrap();
     assert_eq!(*again, Subject::open(&folder).unwrap());
-    let labels: Vec<_> = again.layers().iter().map(|layer| layer.label()).collect();
+    let labels: Vec<_> = again.layers().iter().map(Layer::label).collect();
     assert_eq!(labels, ["00-body", "01-jeans", "02-scarf"]);
     let types: Vec<_> = again.layers().iter().map(|layer| layer.garment.as_deref()).collect();
     assert_eq!(types, [None, Some("trousers"), Some("other")]);
@@ -202,7 +202,7 @@ fn colour_that_is_damaged_behind_its_header_is_counted_and_said() {
     noise.save(&cut).unwrap();
     let whole = fs::read(&cut).unwrap();
     let scan = whole.windows(2).position(|pair| pair == [0xff, 0xda]).unwrap() + 14;
-    fs::write(&cut, &whole[..(scan + whole.len()) / 2]).unwrap();
+    fs::write(&cut, &whole[..usize::midpoint(scan, whole.len())]).unwrap();
     let mut bytes = whole.clone();
     bytes[scan + 20..scan + 60].copy_from_slice(&[0xff, 0xd5].repeat(20));
     fs::write(&overwritten, bytes).unwrap();

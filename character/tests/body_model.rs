@@ -1,8 +1,6 @@
 //! The shipped body model: its invariants, its joints, its speed, and that it can express unknown people.
 #![allow(clippy::unwrap_used)] // helpers of tests are not seen as tests
 
-use std::path::PathBuf;
-
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use toile_character::{
@@ -238,9 +236,8 @@ fn mean_value_weights_match_the_cached_ones() {
 /// Bodies of the private test data share the template, subdivided once: their first vertices are the template's.
 /// Un-posed they must lie within the model's span, up to the smooth detail put on them.
 #[test]
-#[ignore = "needs the private subjects"]
 fn unknown_people_lie_near_the_models_span() {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/subjects");
+    let Some(root) = toile_outside::data("subjects") else { return };
     let list = std::fs::read_dir(&root).unwrap_or_else(|e| panic!("{}: {e}", root.display()));
     let m = model();
     let mut names: Vec<_> = list.flatten().map(|e| e.path()).collect();

@@ -18,9 +18,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [first, next @ .., out] = &arguments[..] else {
         return Err("usage: fit_under [--seed] SCAN0 SCAN1... OUT".into());
     };
-    let (fit_settings, under_settings) = match is_seed {
-        true => (FitSettings::seed(), UnderSettings::seed()),
-        false => (FitSettings::default(), UnderSettings::default()),
+    let (fit_settings, under_settings) = if is_seed {
+        (FitSettings::seed(), UnderSettings::seed())
+    } else {
+        (FitSettings::default(), UnderSettings::default())
     };
     let out = Path::new(out);
     std::fs::create_dir_all(out)?;

@@ -148,7 +148,7 @@ fn a_slanted_wall_as_near_as_its_blocks_are_long_lies_where_it_is() {
 #[test]
 fn places_too_far_for_their_digits_are_refused_or_fused_but_never_a_panic() {
     let camera = PinholeCamera::ideal(80, 60, 60.0, 60.0, 39.5, 29.5);
-    let view = View::new(&camera, &[1.5; 80 * 60], 2);
+    let view = View::new(&camera, &vec![1.5; 80 * 60], 2);
     for digits in 2..12 {
         let far = Rigid::translation(10f64.powi(digits), -3.3 * 10f64.powi(digits), 0.7);
         let mut field = Tsdf::new(0.004, 0.016, false);

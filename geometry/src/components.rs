@@ -33,7 +33,7 @@ pub fn keep_components(mesh: &Mesh, choose: impl FnOnce(&[Piece]) -> Vec<bool>) 
     let mut all: Vec<Option<Piece>> = vec![None; count];
     for (t, triangle) in mesh.triangles.iter().enumerate() {
         let corners = mesh.corners(t);
-        let [a, b, c] = corners.map(|p| p.cast::<f64>());
+        let [a, b, c] = corners.map(Point3::cast::<f64>);
         let start = Piece { area: 0.0, low: corners[0], high: corners[0] };
         let piece = all[label[triangle[0] as usize] as usize].get_or_insert(start);
         piece.area += (b - a).cross(&(c - a)).norm() * 0.5;

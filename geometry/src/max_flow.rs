@@ -231,12 +231,12 @@ impl GraphCut {
             }
             e = self.next[e as usize];
         }
-        if best != NONE {
+        if best == NONE {
+            self.free(node, tree);
+        } else {
             self.parent[node as usize] = best;
             self.stamp[node as usize] = self.time;
             self.depth[node as usize] = best_depth + 1;
-        } else {
-            self.free(node, tree);
         }
     }
 

@@ -88,7 +88,7 @@ mod tests {
             let t = i as f32;
             let p = [0.0, 1.0, 2.0, 3.0]
                 .map(|k: f32| Point3::new((t * 1.3 + k).sin(), (t * 0.7 + 2.0 * k).cos(), (t * 0.31 + k * k).sin()));
-            let exact = exact_sign(&p.map(|q| q.cast::<f64>()));
+            let exact = exact_sign(&p.map(Point3::cast::<f64>));
             assert_eq!(orientation(&p[0], &p[1], &p[2], &p[3]), exact);
         }
     }

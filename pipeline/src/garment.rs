@@ -50,6 +50,7 @@ pub fn given_thickness(run: &Run, number: usize) -> Result<Option<f32>, Pipeline
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes what it serialises by reference")]
 fn as_text<S: serde::Serializer>(garment_type: &GarmentType, to: S) -> Result<S::Ok, S::Error> {
     to.collect_str(garment_type)
 }

@@ -35,7 +35,7 @@ impl<'a> Run<'a> {
     ) -> Result<Self, PipelineError> {
         let subject = LockedSubject::open(root)?;
         check_types(root, subject.layers())?;
-        let mut layers: Vec<String> = subject.layers().iter().map(|l| l.label()).collect();
+        let mut layers: Vec<String> = subject.layers().iter().map(Layer::label).collect();
         if layers.is_empty() {
             let reason =
                 "the subject has no take yet; bring one in with `toile import FOLDER --subject DIR --layer body`";
@@ -91,7 +91,7 @@ impl<'a> Run<'a> {
     /// The type of the garment that take `n` added, where it is known.
     pub fn garment_type(&self, n: usize) -> Option<GarmentType> {
         let layer = self.subject.as_ref()?.layers().get(n).filter(|_| n > 0)?;
-        let by_name = || toile_character::GarmentType::from_layer_name(&layer.name).map(|garment| garment.name());
+        let by_name = || toile_character::GarmentType::from_layer_name(&layer.name).map(GarmentType::name);
         layer.garment.as_deref().or_else(by_name)?.parse().ok()
     }
 

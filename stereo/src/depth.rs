@@ -73,7 +73,7 @@ impl DepthFromPair {
     /// # Errors
     /// [`StereoError::Images`] where the image is not of the calibration's size.
     pub fn rectified_left(&self, left: &RgbImage) -> Result<RgbImage, StereoError> {
-        self.maps[0].rgb(left).ok_or_else(|| self.other_size(left, left))
+        self.maps[0].rgb(left).ok_or_else(|| other_size(left, left))
     }
 
     /// Depth of a pair taken at one time: rectified, matched, in units of `depth_scale`; 0 where it is not known.
@@ -82,7 +82,7 @@ impl DepthFromPair {
     /// [`StereoError::Images`] where an image is not of the calibration's size.
     pub fn depth(&self, left: &RgbImage, right: &RgbImage) -> Result<PairDepth, StereoError> {
         let (Some(rectified), Some(other)) = (self.maps[0].rgb(left), self.maps[1].rgb(right)) else {
-            return Err(self.other_size(left, right));
+            return Err(other_size(left, right));
         };
         let disparities = match_pair(&luma(&rectified), &luma(&other), &self.settings.matching)?;
         Ok(PairDepth { depth: self.depth_of(&disparities), left: rectified })
@@ -106,11 +106,11 @@ impl DepthFromPair {
         let values = disparities.values.par_iter().enumerate().map(value).collect();
         DepthImage { width: disparities.width, height: disparities.height, values }
     }
+}
 
-    fn other_size(&self, left: &RgbImage, right: &RgbImage) -> StereoError {
-        let size = |i: &RgbImage| (i.width, i.height, i.pixels.len());
-        StereoError::Images { left: size(left), right: size(right) }
-    }
+fn other_size(left: &RgbImage, right: &RgbImage) -> StereoError {
+    let size = |i: &RgbImage| (i.width, i.height, i.pixels.len());
+    StereoError::Images { left: size(left), right: size(right) }
 }
 
 /// First disparity and number of disparities between `far` and `near`, one more on either side for the fractions.

@@ -104,7 +104,7 @@ fn check_baseline(t: Vector3<f64>) -> Result<(), String> {
 
 /// The camera that both views share.
 fn common_camera(views: [&View; 2], (w, h): (u32, u32), alpha: Option<f64>) -> PinholeCamera {
-    let f = (views[0].lens.fy + views[1].lens.fy) / 2.0;
+    let f = f64::midpoint(views[0].lens.fy, views[1].lens.fy);
     let (right, bottom) = (f64::from(w) - 1.0, f64::from(h) - 1.0);
     let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
     let mean = |view: &View| corners.iter().map(|&(u, v)| view.ray(u, v)).sum::<Vector2<f64>>() / 4.0;

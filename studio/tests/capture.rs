@@ -82,7 +82,7 @@ fn ctrl_c_finishes_the_file() {
     let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
     let part = subject.join("takes/00-body.mcap.part");
     let start = Instant::now();
-    while !part.exists() && start.elapsed() < Duration::from_secs(60) {
+    while !part.exists() && start.elapsed() < Duration::from_mins(1) {
         std::thread::sleep(Duration::from_millis(20));
     }
     std::thread::sleep(Duration::from_millis(700));

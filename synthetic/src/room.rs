@@ -20,10 +20,11 @@ const WALL_HEIGHT: f32 = 1.6;
 
 /// The disk, its top at y = 0 around the y axis: a checked top and a plain rim. It turns with the subject.
 pub fn disk() -> Mesh {
-    let mut disk = Mesh::default();
-    let n = (DISK_RADIUS / CHECK).ceil() as i32;
     /// Quads a check along each edge, so that checks follow the circle.
     const FINE: i32 = 3;
+    const SIDES: usize = 96;
+    let mut disk = Mesh::default();
+    let n = (DISK_RADIUS / CHECK).ceil() as i32;
     let size = CHECK / FINE as f32;
     for i in -n * FINE..n * FINE {
         for j in -n * FINE..n * FINE {
@@ -33,7 +34,6 @@ pub fn disk() -> Mesh {
             add_quad(&mut disk, [corner(0, 0), corner(0, 1), corner(1, 1), corner(1, 0)], color);
         }
     }
-    const SIDES: usize = 96;
     for k in 0..SIDES {
         let at = |k: usize, y: f32| {
             let (sin, cos) = (std::f32::consts::TAU * k as f32 / SIDES as f32).sin_cos();

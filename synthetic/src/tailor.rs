@@ -63,11 +63,6 @@ impl Measure<'_> {
         self.across([Joint::LeftUpperArm, Joint::LeftLowerArm, Joint::LeftHand], share)
     }
 
-    fn level(&self, y: f32, up: bool) -> Plane {
-        let normal = if up { Vector3::y() } else { -Vector3::y() };
-        Plane { point: Point3::new(0.0, y, 0.0), normal }
-    }
-
     /// A little lower in front than behind, as waistbands sit.
     fn waistband(&self) -> Plane {
         let crotch = self.landmark("crotch").y;
@@ -111,7 +106,7 @@ impl Measure<'_> {
         let (hip, knee) = (self.joint(Joint::LeftUpperLeg).y, self.joint(Joint::LeftLowerLeg).y);
         let lower_end = hip + thigh_share * (knee - hip);
         Tailoring {
-            ends: vec![waist, self.level(lower_end, false)],
+            ends: vec![waist, level(lower_end, false)],
             neckline: None,
             within: None,
             legs: None,
@@ -133,7 +128,7 @@ impl Measure<'_> {
         let hip = self.joint(Joint::LeftUpperLeg).y;
         let lower_end = hip + 0.05 - below;
         Tailoring {
-            ends: vec![self.level(lower_end, false)],
+            ends: vec![level(lower_end, false)],
             neckline: Some(self.neckline(0.026)),
             within: None,
             legs: None,
@@ -160,7 +155,7 @@ impl Measure<'_> {
         let (hip, knee) = (self.joint(Joint::LeftUpperLeg).y, self.joint(Joint::LeftLowerLeg).y);
         let lower_end = knee + 0.15 * (hip - knee);
         let jacket = self.open_top(sleeve_share, 0.0, 0.015);
-        let ends = vec![self.level(lower_end, false)];
+        let ends = vec![level(lower_end, false)];
         Tailoring { ends, drape: 1.0, flare: 0.05, lower_end, opening: Some((0.03, 0.0)), ..jacket }
     }
 
@@ -169,7 +164,7 @@ impl Measure<'_> {
         let (hip, knee) = (self.joint(Joint::LeftUpperLeg).y, self.joint(Joint::LeftLowerLeg).y);
         let lower_end = knee + 0.1 * (hip - knee);
         let top = self.top(sleeve_share, 0.0, 0.009, 0.7);
-        Tailoring { ends: vec![self.level(lower_end, false)], flare: 0.06, pleats: 0.01, lower_end, ..top }
+        Tailoring { ends: vec![level(lower_end, false)], flare: 0.06, pleats: 0.01, lower_end, ..top }
     }
 
     /// A ring around the neck, wide enough to lie on the shoulders.
@@ -180,7 +175,7 @@ impl Measure<'_> {
         let highest = self.landmark("chin").y - 0.01;
         let jumper = self.top(0.0, 0.0, 0.016, 0.0);
         Tailoring {
-            ends: vec![self.level(lower_end, false), self.level(highest, true)],
+            ends: vec![level(lower_end, false), level(highest, true)],
             neckline: None,
             sleeves: None,
             within: Some((center, 0.13)),
@@ -197,13 +192,11 @@ impl Measure<'_> {
         let chin = self.landmark("chin").y;
         let lower_end = chin + 0.62 * (self.landmark("vertex").y - chin);
         let scarf = self.scarf();
-        Tailoring {
-            ends: vec![self.level(lower_end, false)],
-            within: None,
-            ease: 0.010,
-            creases: 0.003,
-            lower_end,
-            ..scarf
-        }
+        Tailoring { ends: vec![level(lower_end, false)], within: None, ease: 0.010, creases: 0.003, lower_end, ..scarf }
     }
+}
+
+fn level(y: f32, up: bool) -> Plane {
+    let normal = if up { Vector3::y() } else { -Vector3::y() };
+    Plane { point: Point3::new(0.0, y, 0.0), normal }
 }

@@ -127,7 +127,7 @@ fn words(name: &str) -> Vec<String> {
         let hump = c.is_ascii_uppercase()
             && (before.is_some_and(|b| b.is_ascii_lowercase())
                 || before.is_some_and(|b| b.is_ascii_uppercase())
-                    && chars.get(i + 1).is_some_and(|n| n.is_ascii_lowercase()));
+                    && chars.get(i + 1).is_some_and(char::is_ascii_lowercase));
         let digits = before.is_some_and(|b| b.is_ascii_digit() != c.is_ascii_digit());
         if hump || digits || !c.is_ascii_alphanumeric() {
             words.push(String::new());

@@ -42,7 +42,7 @@ fn hips_offset(phase: f64) -> Vector3<f64> {
 }
 
 /// The greatest mean height of the hips at which both legs always reach their feet.
-pub(super) fn pelvis_height(gait: &Gait) -> f64 {
+pub(super) fn pelvis_height(gait: Gait) -> f64 {
     const STRETCH: f64 = 0.992; // of the leg's length: knees are never quite straight
     let leg = (THIGH + SHANK) * STRETCH;
     let mut height = f64::MAX;
@@ -64,7 +64,7 @@ fn side_of(left: Vector3<f64>, side: f64) -> Vector3<f64> {
 
 impl Moment {
     /// The walker at `phase` of the cycle, hips at mean `height`, upper arms `arm_spread` from the vertical.
-    pub fn new(gait: &Gait, height: f64, arm_spread: f64, phase: f64) -> Self {
+    pub fn new(gait: Gait, height: f64, arm_spread: f64, phase: f64) -> Self {
         let hips = hips_offset(phase) + Vector3::y() * height;
         let mut moment = Self { hips, world: vec![UnitQuaternion::identity(); SKELETON.len()] };
         moment.trunk(phase);
@@ -103,9 +103,10 @@ impl Moment {
         let knee_forward = turn(1, side * 0.06) * Vector3::z();
         let (thigh, shank) = bend(&(foot.ankle_on(side) - hip), THIGH, SHANK, &knee_forward);
         let outward = turn(1, side * Foot::TOE_OUT);
-        let joints = match side > 0.0 {
-            true => [Joint::LeftUpperLeg, Joint::LeftLowerLeg, Joint::LeftFoot, Joint::LeftToes],
-            false => [Joint::RightUpperLeg, Joint::RightLowerLeg, Joint::RightFoot, Joint::RightToes],
+        let joints = if side > 0.0 {
+            [Joint::LeftUpperLeg, Joint::LeftLowerLeg, Joint::LeftFoot, Joint::LeftToes]
+        } else {
+            [Joint::RightUpperLeg, Joint::RightLowerLeg, Joint::RightFoot, Joint::RightToes]
         };
         let turns = [thigh, shank, outward * turn(0, foot.pitch), outward * turn(0, foot.toe_pitch)];
         for (joint, rotation) in joints.into_iter().zip(turns) {
@@ -125,9 +126,10 @@ impl Moment {
         let upper = shoulders * turn(0, -swing) * hang;
         let lower = upper * turn(1, -side * flexion);
         let hand = lower * turn(1, -side * 0.08);
-        let joints = match side > 0.0 {
-            true => [Joint::LeftUpperArm, Joint::LeftLowerArm, Joint::LeftHand],
-            false => [Joint::RightUpperArm, Joint::RightLowerArm, Joint::RightHand],
+        let joints = if side > 0.0 {
+            [Joint::LeftUpperArm, Joint::LeftLowerArm, Joint::LeftHand]
+        } else {
+            [Joint::RightUpperArm, Joint::RightLowerArm, Joint::RightHand]
         };
         for (joint, rotation) in joints.into_iter().zip([upper, lower, hand]) {
             self.set(joint, rotation);

@@ -11,7 +11,7 @@ use nalgebra::Matrix4;
 use serde_json::{Map, Value};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
-use super::{inventory::Listing, rigid::rigid_from_matrix};
+use super::{inventory::Listing, rigid::rigid_from_matrix, timed::has_extension};
 use crate::{CaptureError, DeviceIdentity, Rig, Sensor, depth_codec::MAX_PIXELS, files::read_text};
 
 /// What a calibration file says.
@@ -64,7 +64,8 @@ pub(super) fn find(folder: &Path) -> Result<Option<PathBuf>, CaptureError> {
 fn find_in(folder: &Path) -> Result<Option<PathBuf>, CaptureError> {
     let listing = Listing::read(folder)?;
     let named = |name: &&String| name.as_str() == "camera.json";
-    let similar = |name: &&String| name.ends_with(".json") && (name.contains("camera") || name.contains("intrinsic"));
+    let similar =
+        |name: &&String| has_extension(name, &["json"]) && (name.contains("camera") || name.contains("intrinsic"));
     let found = listing.files.iter().find(named).or_else(|| listing.files.iter().find(similar));
     Ok(found.map(|name| folder.join(name)))
 }
@@ -96,18 +97,15 @@ pub(super) fn parse(text: &str) -> Result<CameraFile, String> {
 fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCamera, String> {
     let width = pixels(object, prefix, "width")?;
     let height = pixels(object, prefix, "height")?;
-    let [fx, fy, cx, cy] = match object.get("intrinsic_matrix") {
-        Some(matrix) => {
-            let m: [f64; 9] = numbers(matrix)
-                .ok_or_else(|| format!("field `{prefix}intrinsic_matrix` must be a list of 9 numbers"))?;
-            // Below the diagonal a camera matrix is zero, which shows the order that it is written in.
-            let is_by_row = m[6] == 0.0 && m[7] == 0.0 && (m[2] != 0.0 || m[5] != 0.0);
-            if is_by_row { [m[0], m[4], m[2], m[5]] } else { [m[0], m[4], m[6], m[7]] }
-        }
-        None => {
-            let number = |name: &str| required(object, prefix, name);
-            [number("fx")?, number("fy")?, number("cx")?, number("cy")?]
-        }
+    let [fx, fy, cx, cy] = if let Some(matrix) = object.get("intrinsic_matrix") {
+        let m: [f64; 9] =
+            numbers(matrix).ok_or_else(|| format!("field `{prefix}intrinsic_matrix` must be a list of 9 numbers"))?;
+        // Below the diagonal a camera matrix is zero, which shows the order that it is written in.
+        let is_by_row = m[6] == 0.0 && m[7] == 0.0 && (m[2] != 0.0 || m[5] != 0.0);
+        if is_by_row { [m[0], m[4], m[2], m[5]] } else { [m[0], m[4], m[6], m[7]] }
+    } else {
+        let number = |name: &str| required(object, prefix, name);
+        [number("fx")?, number("fy")?, number("cx")?, number("cy")?]
     };
     for (name, focal) in [("fx", fx), ("fy", fy)] {
         if focal <= 0.0 {
@@ -185,8 +183,8 @@ mod tests {
             (GOOD.replace("512", "0"), "`width` is 0"),
             (GOOD.replace("424", "1e9"), "`height` is"),
             (GOOD.replace("0.001", "0"), "`depth_scale` is 0"),
-            (GOOD.replace("}", r#", "distortion": [1, 2]}"#), "`distortion`"),
-            (GOOD.replace("}", r#", "color": {"width": 3}}"#), "`color.height` is missing"),
+            (GOOD.replace('}', r#", "distortion": [1, 2]}"#), "`distortion`"),
+            (GOOD.replace('}', r#", "color": {"width": 3}}"#), "`color.height` is missing"),
             (GOOD.replace("256", "600"), "`cx` is 600"),
             (GOOD.replace("212", "-1"), "`cy` is -1"),
             ("[]".to_string(), "JSON object"),

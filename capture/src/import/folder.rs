@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     camera_file::{self, CameraFile},
-    inventory::{DEFAULT_FPS, Entry, FolderSource, Listing, last_number, measured_fps, pair, steady_time},
+    inventory::{DEFAULT_FPS, Entry, FolderSource, Listing, Refused, last_number, measured_fps, pair, steady_time},
     timed::{Timed, has_extension, named_by_time, pair_by_time},
 };
 use crate::{CaptureError, files::read_text, printable, trajectory::parse_seconds};
@@ -27,8 +27,8 @@ pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, Captu
     };
     let camera = camera_file::read(&camera_path)?;
     let color_name = ["color", "rgb"].into_iter().find(|name| listing.folders.iter().any(|folder| folder == name));
-    let depth = Images::list(path.join("depth"), DEPTH_EXTENSIONS)?;
-    let color = color_name.map(|name| Images::list(path.join(name), COLOR_EXTENSIONS)).transpose()?;
+    let depth = Images::list(&path.join("depth"), DEPTH_EXTENSIONS)?;
+    let color = color_name.map(|name| Images::list(&path.join(name), COLOR_EXTENSIONS)).transpose()?;
     let is_timed = matches!(depth, Images::Timed(_));
     let mut entries = match (depth, color) {
         (Images::Timed(depth), None) => pair_by_time(depth, Vec::new()),
@@ -42,8 +42,8 @@ pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, Captu
     };
     // Numbers may leave some out, so only names that are times show the rate.
     let rate = if is_timed { measured_fps(&entries) } else { None };
-    if let Some(times) = read_times(path)? {
-        set_times(path, &mut entries, &times)?;
+    if let Some(stamps) = read_times(path)? {
+        set_times(path, &mut entries, &stamps)?;
     }
     let has_color = entries.iter().any(|entry| entry.color.is_some());
     let fps = camera.fps.or(rate).unwrap_or(DEFAULT_FPS);
@@ -60,13 +60,13 @@ enum Images {
 }
 
 impl Images {
-    fn list(folder: PathBuf, extensions: &[&str]) -> Result<Self, CaptureError> {
-        let listing = Listing::read(&folder)?;
-        if let Some(timed) = named_by_time(&folder, &listing, extensions)? {
+    fn list(folder: &Path, extensions: &[&str]) -> Result<Self, CaptureError> {
+        let listing = Listing::read(folder)?;
+        if let Some(timed) = named_by_time(folder, &listing, extensions)? {
             return Ok(Self::Timed(timed));
         }
         let number = |name: &str| last_number(name).filter(|_| has_extension(name, extensions));
-        listing.numbered(&folder, number).map(Self::Numbered)
+        listing.numbered(folder, number).map(Self::Numbered)
     }
 }
 
@@ -75,13 +75,35 @@ fn numbered_pairs(depth: BTreeMap<u64, PathBuf>, color: BTreeMap<u64, PathBuf>, 
     pair(depth, color, BTreeMap::new(), |_, number| steady_time(number, fps))
 }
 
-/// Gives frames the times of timestamps.txt.
-fn set_times(path: &Path, entries: &mut [Entry], times: &[i64]) -> Result<(), CaptureError> {
+/// A line of timestamps.txt that has a time.
+struct Stamp {
+    /// Number of the line, from 1.
+    line: usize,
+    time_ns: i64,
+}
+
+/// Gives frames the times of timestamps.txt. Of two frames with the same time the first is kept and the second refused:
+/// which of them was taken then is not known.
+fn set_times(path: &Path, entries: &mut [Entry], stamps: &[Stamp]) -> Result<(), CaptureError> {
     let numbers: Vec<u64> = entries.iter().map(|entry| entry.number).collect();
-    let first = first_line(path, &numbers, times.len())?;
+    let first = first_line(path, &numbers, stamps.len())?;
+    let (mut before, mut repeated) = (None, 0);
     for (position, entry) in entries.iter_mut().enumerate() {
-        let line = first.map_or(position, |first| (entry.number - first) as usize);
-        entry.time_ns = times[line];
+        let stamp = &stamps[first.map_or(position, |first| (entry.number - first) as usize)];
+        entry.time_ns = stamp.time_ns;
+        if before == Some(stamp.time_ns) {
+            repeated += 1;
+            let reason = format!(
+                "line {} has the same time as the frame before; frame {} is left out",
+                stamp.line, entry.number
+            );
+            entry.refused = Some(Refused { file: path.join("timestamps.txt"), reason });
+        }
+        before = Some(stamp.time_ns);
+    }
+    if 2 * repeated > entries.len() {
+        let reason = format!("{repeated} of {} frames have the same time as the one before", entries.len());
+        return Err(CaptureError::format(&path.join("timestamps.txt"), reason));
     }
     Ok(())
 }
@@ -109,29 +131,29 @@ fn first_line(path: &Path, numbers: &[u64], lines: usize) -> Result<Option<u64>,
     ))
 }
 
-/// The times, nanoseconds: whole numbers are nanoseconds, numbers with a decimal point seconds.
-fn read_times(folder: &Path) -> Result<Option<Vec<i64>>, CaptureError> {
+/// The times, which do not fall: whole numbers are nanoseconds, numbers with a decimal point seconds.
+fn read_times(folder: &Path) -> Result<Option<Vec<Stamp>>, CaptureError> {
     let path = folder.join("timestamps.txt");
     if !path.exists() {
         return Ok(None);
     }
     let text = read_text(&path)?;
-    let mut times: Vec<i64> = Vec::new();
+    let mut stamps: Vec<Stamp> = Vec::new();
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let word = line.trim();
         let time = if word.contains('.') { parse_seconds(word) } else { word.parse().ok() };
-        let time = time.ok_or_else(|| {
+        let time_ns = time.ok_or_else(|| {
             CaptureError::format(
                 &path,
                 format!("line {} is not a time in nanoseconds: `{}`", number + 1, printable(word)),
             )
         })?;
-        if times.last().is_some_and(|&before| before >= time) {
-            return Err(CaptureError::format(&path, format!("line {} is not later than the one before", number + 1)));
+        if stamps.last().is_some_and(|before| before.time_ns > time_ns) {
+            return Err(CaptureError::format(&path, format!("line {} is earlier than the one before", number + 1)));
         }
-        times.push(time);
+        stamps.push(Stamp { line: number + 1, time_ns });
     }
-    Ok(Some(times))
+    Ok(Some(stamps))
 }
 
 #[cfg(test)]

@@ -70,7 +70,7 @@ fn is_of_the_system(name: &str) -> bool {
 pub(super) fn last_number(name: &str) -> Option<u64> {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let digits = |c: char| c.is_ascii_digit();
-    let ending = &stem[..stem.rfind(digits)? + 1];
+    let ending = &stem[..=stem.rfind(digits)?];
     ending[ending.trim_end_matches(digits).len()..].parse().ok()
 }
 
@@ -82,6 +82,15 @@ pub(super) struct Entry {
     pub(super) depth: Option<PathBuf>,
     pub(super) color: Option<PathBuf>,
     pub(super) mask: Option<PathBuf>,
+    /// Why the frame cannot be used although its images are there.
+    pub(super) refused: Option<Refused>,
+}
+
+/// The file that makes a frame useless, and what is wrong in it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Refused {
+    pub(super) file: PathBuf,
+    pub(super) reason: String,
 }
 
 /// Pairs depth with colour by number. `time_ns` gives the time of a number.
@@ -100,6 +109,7 @@ pub(super) fn pair(
         depth: depth.remove(&number),
         color: color.remove(&number),
         mask: mask.remove(&number),
+        refused: None,
     };
     numbers.into_iter().enumerate().map(entry).collect()
 }
@@ -152,6 +162,9 @@ impl FolderSource {
 
     fn load(&self, index: usize) -> Result<Frame, CaptureError> {
         let entry = &self.entries[index];
+        if let Some(refused) = &entry.refused {
+            return Err(CaptureError::format(&refused.file, &refused.reason));
+        }
         let sensor = &self.rig.sensors[0];
         let depth = match &entry.depth {
             Some(path) => {

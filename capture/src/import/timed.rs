@@ -34,7 +34,7 @@ pub(super) fn pair_by_time(mut depth: Vec<Timed>, mut color: Vec<Timed>) -> Vec<
 }
 
 fn entry(time_ns: i64, depth: Option<PathBuf>, color: Option<&Timed>) -> Entry {
-    Entry { number: 0, time_ns, depth, color: color.map(|c| c.path.clone()), mask: None }
+    Entry { number: 0, time_ns, depth, color: color.map(|c| c.path.clone()), mask: None, refused: None }
 }
 
 /// The images of a folder with one of these extensions, where all of their names are times; `None` where none is.

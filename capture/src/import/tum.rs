@@ -43,7 +43,7 @@ pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, Captu
 /// True for names such as `TUM_depth.png`.
 pub(super) fn is_paired_depth(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
-    name.ends_with(".png") && name.contains("depth")
+    has_extension(&name, &["png"]) && name.contains("depth")
 }
 
 fn read_list(folder: &Path, name: &str) -> Result<Vec<Timed>, CaptureError> {
@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     fn numbers(keys: &[&str]) -> Vec<(String, u64)> {
-        let keys: Vec<String> = keys.iter().map(|key| key.to_string()).collect();
+        let keys: Vec<String> = keys.iter().map(ToString::to_string).collect();
         let mut numbers: Vec<_> = frame_numbers(keys.iter()).into_iter().collect();
         numbers.sort_by_key(|(_, number)| *number);
         numbers

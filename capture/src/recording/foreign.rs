@@ -36,7 +36,7 @@ pub(super) fn find_frames(
 ) -> Result<(Rig, Vec<Entry>), CaptureError> {
     let mut survey = Survey::default();
     for_each_record(container, outline, |chunk, record| {
-        survey.add(chunk, record).map_err(|reason| CaptureError::format(path, reason))
+        survey.add(chunk, &record).map_err(|reason| CaptureError::format(path, reason))
     })?;
     survey.frames().map_err(|reason| CaptureError::format(path, reason))
 }
@@ -65,8 +65,8 @@ struct Images {
 }
 
 impl Survey {
-    fn add(&mut self, chunk: usize, record: Record) -> Result<(), String> {
-        match record {
+    fn add(&mut self, chunk: usize, record: &Record) -> Result<(), String> {
+        match *record {
             Record::Schema { id, name } => {
                 let shown = name.chars().take(80).collect();
                 self.schemas.insert(id, (Schema::from_name(name), shown));

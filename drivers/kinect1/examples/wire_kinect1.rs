@@ -134,7 +134,7 @@ fn gspca(node: &Path, count: u64) -> Outcome<()> {
     opened.start(4)?;
     let (mut next, mut torn) = (0, 0);
     for _ in 0..count {
-        let buffer = opened.next_buffer(Duration::from_secs(60))?;
+        let buffer = opened.next_buffer(Duration::from_mins(1))?;
         // The first pictures after the start may be of a frame that was under way.
         let found = (next..next + 300).find(|k| Pattern::default().bayer(*k) == buffer.bytes);
         torn += u64::from(found.is_none());

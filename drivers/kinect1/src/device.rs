@@ -33,10 +33,9 @@ impl Kinect1 {
         device.claim(0, u8::from(info.product == KINECT_FOR_WINDOWS))?;
         let mut commands = Commands::new(settings.command_limit);
         let calibration = commands.calibration(&mut *device)?;
-        let limit = settings.frame_limit;
-        let streams = Kinect1Streams::start(device, commands, &calibration, settings.clone())?;
-        let rig = rig(&info, serial, &streams.registration, &settings);
-        Ok(Self { streaming: Streaming::new(streams, limit), calibration, rig })
+        let streaming = Kinect1Streams::start(device, commands, &calibration, settings)?;
+        let rig = rig(&info, serial, &streaming.streams().registration, &streaming.streams().settings);
+        Ok(Self { streaming, calibration, rig })
     }
 
     /// The camera's own calibration.
@@ -65,12 +64,5 @@ impl Source for Kinect1 {
             let device = self.rig.sensors[0].name.clone();
             CaptureError::Device { device, reason: error.to_string() }
         })
-    }
-}
-
-impl Drop for Kinect1 {
-    fn drop(&mut self) {
-        let answers = self.streaming.is_running();
-        self.streaming.streams_mut().stop(answers);
     }
 }

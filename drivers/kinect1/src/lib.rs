@@ -50,4 +50,5 @@ pub use find::list;
 pub use health::Health;
 pub use motor::{Led, Motor, MotorState};
 pub use registration::Registration;
-pub use settings::{DepthMode, Settings, VideoMode};
+pub use settings::{DepthMode, Settings};
+pub use toile_driver_transport::streaming::VideoMode;

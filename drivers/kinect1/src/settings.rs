@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use toile_driver_transport::streaming::VideoMode;
+
 /// How depth is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DepthMode {
@@ -12,24 +14,12 @@ pub enum DepthMode {
     Ten,
 }
 
-/// What the video stream shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum VideoMode {
-    /// Colour, 640×480.
-    #[default]
-    Color,
-    /// What the depth camera sees, as grey, 640×488.
-    Infrared,
-    /// Nothing.
-    Off,
-}
-
 /// How to stream.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Default: eleven bits.
     pub depth: DepthMode,
-    /// Default: colour.
+    /// Colour of 640×480 pixels, or infrared of 640×488. Default: colour.
     pub video: VideoMode,
     /// Give depth as the colour camera sees it, by the device's registration. Default false: depth as it was measured,
     /// with the colour camera's place in the rig.

@@ -1,6 +1,7 @@
 //! Transfers to frames: what the bus brings to depth and colour, paired by time.
 
 use std::{
+    ops::ControlFlow,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -10,8 +11,8 @@ use toile_capture::{
     pairing::{Pair, Pairing},
 };
 use toile_driver_transport::{
-    Transfer, TransferStatus, TransportError, UsbDevice,
-    streaming::{Numbering, Progress, Streams},
+    Transfer, UsbDevice,
+    streaming::{Numbering, Progress, Streaming, Streams, next_transfer},
     usb::MICROFRAME,
 };
 
@@ -34,7 +35,7 @@ const TICKS_PER_SECOND: u32 = 60_000_000;
 pub(crate) struct Kinect1Streams {
     device: Box<dyn UsbDevice>,
     commands: Commands,
-    settings: Settings,
+    pub(crate) settings: Settings,
     mm_from_raw: Vec<u16>,
     pub(crate) registration: Registration,
     depth: Assembler,
@@ -53,9 +54,10 @@ impl Kinect1Streams {
         commands: Commands,
         calibration: &Calibration,
         settings: Settings,
-    ) -> Result<Self, Kinect1Error> {
+    ) -> Result<Streaming<Self>, Kinect1Error> {
         let bits = if settings.depth == DepthMode::Eleven { 11 } else { 10 };
-        let mut streams = Self {
+        let limit = settings.frame_limit;
+        let streams = Self {
             device,
             commands,
             mm_from_raw: calibration.mm_from_raw(),
@@ -69,30 +71,15 @@ impl Kinect1Streams {
             numbering: Numbering::new(FRAME_NS),
             health: Health::default(),
         };
-        let started = streams.fill_queues().and_then(|()| streams.switch_on());
-        match started {
-            Ok(()) => Ok(streams),
-            Err(error) => {
-                streams.stop(true);
-                Err(error)
-            }
-        }
+        Streaming::start(streams, limit, |streams| {
+            streams.fill_queues()?;
+            streams.switch_on()
+        })
     }
 
     /// How well it went so far, restarts left out.
     pub(crate) fn health(&self) -> Health {
         Health { depth: self.depth.losses(), video: self.video.losses(), alone: self.pairing.alone(), ..self.health }
-    }
-
-    /// Switches the camera off where it still answers, and gives the transfers back.
-    pub(crate) fn stop(&mut self, answers: bool) {
-        if answers {
-            // A camera that is left on keeps the bus busy; whether it hears this cannot be helped.
-            for register in [0x06, 0x05] {
-                let _ = self.commands.write(&mut *self.device, register, 0);
-            }
-        }
-        self.device.cancel(Duration::from_secs(2));
     }
 
     fn fill_queues(&mut self) -> Result<(), Kinect1Error> {
@@ -206,17 +193,10 @@ impl Streams for Kinect1Streams {
     }
 
     fn step(&mut self) -> Result<Progress, Kinect1Error> {
-        // Bus time decides; the clock only where transfers themselves no longer come back.
-        let transfer = match self.device.wait(3 * self.settings.frame_limit) {
-            Ok(transfer) => transfer,
-            Err(TransportError::TimedOut { .. }) => return Ok(Progress::TimedOut),
-            Err(other) => return Err(other.into()),
+        let transfer = match next_transfer(&mut *self.device, self.settings.frame_limit)? {
+            ControlFlow::Continue(transfer) => transfer,
+            ControlFlow::Break(nothing) => return Ok(nothing),
         };
-        match transfer.status() {
-            TransferStatus::Unplugged => return Err(TransportError::Unplugged.into()),
-            TransferStatus::Cancelled => return Ok(Progress::Silence(Duration::ZERO)),
-            _ => {}
-        }
         let pictures = self.take(&transfer);
         let is_depth = transfer.endpoint() == Stream::Depth.endpoint();
         let packets = if is_depth { transfer.packets().len() as u32 } else { 0 };
@@ -232,6 +212,17 @@ impl Streams for Kinect1Streams {
 
     fn finish(&mut self) {
         self.pairing.finish();
+    }
+
+    /// Switches the camera off where it still answers, and gives the transfers back.
+    fn stop(&mut self, answers: bool) {
+        if answers {
+            // A camera that is left on keeps the bus busy; whether it hears this cannot be helped.
+            for register in [0x06, 0x05] {
+                let _ = self.commands.write(&mut *self.device, register, 0);
+            }
+        }
+        self.device.cancel(Duration::from_secs(2));
     }
 
     fn silent(limit: Duration) -> Kinect1Error {

@@ -32,10 +32,10 @@ impl Kinect2 {
         commands.open(&mut *device)?;
         let identity = commands.identity(&mut *device)?;
         let calibration = commands.calibration(&mut *device)?;
-        let (limit, mode) = (settings.frame_limit, settings.color);
-        let streams = Kinect2Streams::start(device, commands, &calibration, settings)?;
-        let rig = rig(identity, &calibration, &streams.registration, mode);
-        Ok(Self { streaming: Streaming::new(streams, limit), calibration, rig })
+        let mode = settings.color;
+        let streaming = Kinect2Streams::start(device, commands, &calibration, settings)?;
+        let rig = rig(identity, &calibration, &streaming.streams().registration, mode);
+        Ok(Self { streaming, calibration, rig })
     }
 
     /// The camera's own calibration.
@@ -64,12 +64,5 @@ impl Source for Kinect2 {
             let device = self.rig.sensors[0].name.clone();
             CaptureError::Device { device, reason: error.to_string() }
         })
-    }
-}
-
-impl Drop for Kinect2 {
-    fn drop(&mut self) {
-        let answers = self.streaming.is_running();
-        self.streaming.streams_mut().stop(answers);
     }
 }

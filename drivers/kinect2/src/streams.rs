@@ -1,6 +1,7 @@
 //! Transfers to frames: what the bus brings to depth and colour, paired by time and decoded.
 
 use std::{
+    ops::ControlFlow,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -11,7 +12,7 @@ use toile_capture::{
 };
 use toile_driver_transport::{
     Transfer, TransferStatus, TransportError, UsbDevice,
-    streaming::{Numbering, Progress, Streams},
+    streaming::{Numbering, Progress, Streaming, Streams, next_transfer},
     usb::MICROFRAME,
 };
 
@@ -61,8 +62,9 @@ impl Kinect2Streams {
         commands: Commands,
         calibration: &Calibration,
         settings: Settings,
-    ) -> Result<Self, Kinect2Error> {
-        let mut streams = Self {
+    ) -> Result<Streaming<Self>, Kinect2Error> {
+        let limit = settings.frame_limit;
+        let streams = Self {
             device,
             commands,
             decoder: Decoder::new(calibration, settings.decode),
@@ -76,28 +78,15 @@ impl Kinect2Streams {
             numbering: Numbering::new(FRAME_NS),
             health: Health::default(),
         };
-        let started = streams.switch_on().and_then(|()| streams.fill_queues());
-        match started {
-            Ok(()) => Ok(streams),
-            Err(error) => {
-                streams.stop(true);
-                Err(error)
-            }
-        }
+        Streaming::start(streams, limit, |streams| {
+            streams.switch_on()?;
+            streams.fill_queues()
+        })
     }
 
     /// How well it went so far, restarts left out.
     pub(crate) fn health(&self) -> Health {
         Health { depth: self.depth.losses(), color: self.color.losses(), alone: self.pairing.alone(), ..self.health }
-    }
-
-    /// Gives the transfers back, and switches the camera off where it still answers.
-    pub(crate) fn stop(&mut self, answers: bool) {
-        self.device.cancel(Duration::from_secs(2));
-        if answers {
-            // A camera that is left on keeps the bus busy; whether it hears this cannot be helped.
-            let _ = self.commands.stop(&mut *self.device);
-        }
     }
 
     fn switch_on(&mut self) -> Result<(), Kinect2Error> {
@@ -192,7 +181,7 @@ impl Kinect2Streams {
                 return None;
             }
         };
-        let nothing = [0.0; COLUMNS * ROWS];
+        let nothing = if depth_mm.is_none() { vec![0.0; COLUMNS * ROWS] } else { Vec::new() };
         let image = match self.settings.color {
             ColorMode::Full => unmirrored(pixels),
             _ => self.registration.register(depth_mm.unwrap_or(&nothing), &pixels),
@@ -211,20 +200,15 @@ impl Streams for Kinect2Streams {
     }
 
     fn step(&mut self) -> Result<Progress, Kinect2Error> {
-        // Bus time decides; the clock only where transfers themselves no longer come back.
-        let transfer = match self.device.wait(3 * self.settings.frame_limit) {
-            Ok(transfer) => transfer,
-            Err(TransportError::TimedOut { .. }) => return Ok(Progress::TimedOut),
-            Err(other) => return Err(other.into()),
+        let transfer = match next_transfer(&mut *self.device, self.settings.frame_limit)? {
+            ControlFlow::Continue(transfer) => transfer,
+            ControlFlow::Break(nothing) => return Ok(nothing),
         };
-        let progress = match transfer.status() {
-            TransferStatus::Unplugged => return Err(TransportError::Unplugged.into()),
-            TransferStatus::Cancelled => return Ok(Progress::Silence(Duration::ZERO)),
-            _ if transfer.endpoint() == DEPTH_ENDPOINT => self.take_depth(&transfer),
-            _ => {
-                self.take_color(&transfer)?;
-                Progress::Silence(Duration::ZERO)
-            }
+        let progress = if transfer.endpoint() == DEPTH_ENDPOINT {
+            self.take_depth(&transfer)
+        } else {
+            self.take_color(&transfer)?;
+            Progress::Silence(Duration::ZERO)
         };
         self.device.submit(transfer)?;
         Ok(progress)
@@ -238,6 +222,15 @@ impl Streams for Kinect2Streams {
 
     fn finish(&mut self) {
         self.pairing.finish();
+    }
+
+    /// Gives the transfers back, and switches the camera off where it still answers.
+    fn stop(&mut self, answers: bool) {
+        self.device.cancel(Duration::from_secs(2));
+        if answers {
+            // A camera that is left on keeps the bus busy; whether it hears this cannot be helped.
+            let _ = self.commands.stop(&mut *self.device);
+        }
     }
 
     fn silent(limit: Duration) -> Kinect2Error {

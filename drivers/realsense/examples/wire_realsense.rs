@@ -43,7 +43,7 @@ fn main() -> Outcome<()> {
         ["check", file, count] => println!("{}", proof::take(Path::new(file), count.parse()?, shown)?),
         ["first", name] => println!("{}", proof::first_frame(&mut Kernel::new(&[wire(name)?]))?),
         ["cycles", count] => {
-            println!("{}", proof::cycles(&mut Kernel::new(&[Wire::Bulk, Wire::Isochronous]), count.parse()?)?)
+            println!("{}", proof::cycles(&mut Kernel::new(&[Wire::Bulk, Wire::Isochronous]), count.parse()?)?);
         }
         _ => return Err("serve bulk|isochronous | check FILE COUNT | first bulk|isochronous | cycles COUNT".into()),
     }

@@ -108,11 +108,12 @@ enum Part {
 impl Part {
     fn from_formats(offered: &[FourCc]) -> Option<Self> {
         let has = |format| offered.contains(&format);
-        match () {
-            _ if has(FourCc::Z16) => Some(Self::Depth),
-            _ if has(FourCc::Y8I) || has(FourCc::GREY) => Some(Self::Infrared),
-            _ if has(FourCc::YUYV) => Some(Self::Color),
-            _ => None,
+        if has(FourCc::Z16) {
+            Some(Self::Depth)
+        } else if has(FourCc::Y8I) || has(FourCc::GREY) {
+            Some(Self::Infrared)
+        } else {
+            has(FourCc::YUYV).then_some(Self::Color)
         }
     }
 

@@ -52,4 +52,5 @@ pub use device::Realsense;
 pub use error::RealsenseError;
 pub use find::{Camera, Nodes, list};
 pub use health::Health;
-pub use settings::{Settings, VideoMode};
+pub use settings::Settings;
+pub use toile_driver_transport::streaming::VideoMode;

@@ -2,24 +2,14 @@
 
 use std::time::Duration;
 
-use crate::Controls;
+use toile_driver_transport::streaming::VideoMode;
 
-/// What comes beside depth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum VideoMode {
-    /// Colour.
-    #[default]
-    Color,
-    /// The infrared pair as grey: left, which sees what depth sees, beside the depth; right as a sensor of its own.
-    Infrared,
-    /// Nothing.
-    Off,
-}
+use crate::Controls;
 
 /// How to stream.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Default: colour.
+    /// Default: colour. Infrared is a pair: left beside the depth, right as a sensor of its own.
     pub video: VideoMode,
     /// Columns and rows of depth and infrared. Default 640×480, which every model has over USB 2 and 3.
     pub size: (u32, u32),

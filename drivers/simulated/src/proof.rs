@@ -14,7 +14,7 @@ use toile_capture::{Frame, Replay, Source};
 use crate::vhci::Plugged;
 
 /// How long a kernel beside much other work may take for what it does at once.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 /// How often a condition is looked at.
 const LOOK: Duration = Duration::from_millis(20);
 /// What the first frame may take, and how often that is tried: other work of the machine must not decide.

@@ -48,7 +48,7 @@ pub fn serve(model: &Mutex<dyn SimulatedDevice>, line: &mut (impl Read + Write))
         let word =
             |i: usize| u32::from_be_bytes([header[4 * i], header[4 * i + 1], header[4 * i + 2], header[4 * i + 3]]);
         let more = match word(0) {
-            SUBMIT => state.submit(model, Urb::read(&header, line)?, line)?,
+            SUBMIT => state.submit(model, &Urb::read(&header, line)?, line)?,
             UNLINK => state.unlink(word(1), word(5), line)?,
             other => return Err(wrong(&format!("command {other} is not one of USB/IP's"))),
         };
@@ -124,13 +124,13 @@ struct State {
 
 impl State {
     /// Answers a URB; false where the device is gone.
-    fn submit(&mut self, model: &Mutex<dyn SimulatedDevice>, urb: Urb, line: &mut impl Write) -> io::Result<bool> {
+    fn submit(&mut self, model: &Mutex<dyn SimulatedDevice>, urb: &Urb, line: &mut impl Write) -> io::Result<bool> {
         if self.unlinked.remove(&urb.number) {
             return Ok(true);
         }
         let done = {
             let mut model = model.lock().unwrap_or_else(PoisonError::into_inner);
-            if urb.is_isochronous { self.isochronous(&mut *model, &urb) } else { plain(&mut *model, &urb) }
+            if urb.is_isochronous { self.isochronous(&mut *model, urb) } else { plain(&mut *model, urb) }
         };
         let Some(done) = done else { return Ok(false) };
         if urb.is_in && urb.endpoint != 0x80 && done.data.is_empty() {

@@ -209,7 +209,7 @@ fn folders_of_pictures_and_recordings_of_two_sensors_are_rigs_too() {
     assert!(error.contains("left camera's picture 5") && error.contains("left05.png"), "{error}");
     assert!(rig.next_frame().unwrap().is_none());
 
-    let mut recorded = camera(TwoSensors::new(Recorded::new(l, r), chosen.fps));
+    let mut recorded = camera(TwoSensors::new(Recorded::new(&l, &r), chosen.fps));
     let from_recording = all(&mut recorded);
     assert_eq!(from_recording.len(), 2);
     assert_eq!(from_recording[0].depth, from_folder[0].depth);
@@ -223,7 +223,7 @@ struct Recorded {
 }
 
 impl Recorded {
-    fn new(left: Arc<RgbImage>, right: Arc<RgbImage>) -> Self {
+    fn new(left: &Arc<RgbImage>, right: &Arc<RgbImage>) -> Self {
         let frame = |k: u64| Frame {
             sensor: (k % 2) as usize,
             index: k,

@@ -61,8 +61,7 @@ impl Feed {
                 Err(TryRecvError::Disconnected) => Ok(None),
             },
             Self::OnDemand { source, is_host_time } if wanted => next_picture(&mut **source, *is_host_time),
-            Self::OnDemand { .. } => return None,
-            Self::Ended => return None,
+            Self::OnDemand { .. } | Self::Ended => return None,
         };
         if !matches!(next, Ok(Some(_))) {
             *self = Self::Ended;

@@ -93,8 +93,8 @@ impl Guide {
     ///
     /// # Errors
     /// [`FittingError::Singular`] where the equations have no solution.
-    pub fn drive(&self, start: State) -> Result<State, FittingError> {
-        let problem = Driven { guide: self, start: &start, columns: Columns::new(body_joints(), 0) };
+    pub fn drive(&self, start: &State) -> Result<State, FittingError> {
+        let problem = Driven { guide: self, start, columns: Columns::new(body_joints(), 0) };
         Ok(descend(&problem, start.clone(), ITERATIONS)?.state)
     }
 }
@@ -149,7 +149,7 @@ mod tests {
         let at = |name: &str| truth[model.landmark(name).unwrap() as usize];
         let set = names.iter().map(|n| ((*n).to_owned(), at(n).cast::<f64>().into())).collect();
         let guide = Guides::new(&model, &set).on(&model, 0).unwrap();
-        let found = guide.drive(State { pose: Pose::identity(), beta: Vec::new() }).unwrap().pose;
+        let found = guide.drive(&State { pose: Pose::identity(), beta: Vec::new() }).unwrap().pose;
         let posed = model.posed(&[], &found);
         for name in names {
             let off = (posed[model.landmark(name).unwrap() as usize] - at(name)).norm();

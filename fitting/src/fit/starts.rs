@@ -85,7 +85,7 @@ fn candidates(
         let heading = TAU * h as f64 / headings as f64;
         let [first, others @ ..] = ARM_TURNS.map(|arms| {
             let state = places[up].state(model, heading, arms.to_radians(), &ups[up]);
-            let state = problem.guide.map_or(Ok(state.clone()), |guide| guide.drive(state))?;
+            let state = problem.guide.map_or(Ok(state.clone()), |guide| guide.drive(&state))?;
             Ok::<_, FittingError>(Start { misfit: problem.misfit(&state), state, up, iterations: 0 })
         });
         others.into_iter().try_fold(first?, |a, b| b.map(|b| if b.misfit < a.misfit { b } else { a }))

@@ -100,7 +100,7 @@ impl Standing {
         let mut joints = stance(&body.skeleton).joint_positions(&body.skeleton);
         joints.iter_mut().for_each(|j| j.y -= low);
         let landmarks = Landmarks::on(model, &mesh)?;
-        Ok(Self { mesh, landmarks, joints: joints.to_vec(), parts: Parts::new(model) })
+        Ok(Self { mesh, landmarks, joints: joints.clone(), parts: Parts::new(model) })
     }
 
     /// All of it.

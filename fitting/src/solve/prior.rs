@@ -104,6 +104,7 @@ pub(crate) fn add_shape_prior(equations: &mut NormalEquations, state: &State, co
 }
 
 /// Standard deviation of a joint's rotation about the A-pose in someone standing on a turntable, degrees.
+#[expect(clippy::match_same_arms, reason = "a table, in the order of the body")]
 fn standing_sigma(joint: Joint) -> f64 {
     use Joint::*;
     match joint {

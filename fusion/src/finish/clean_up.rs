@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::Point3;
 use toile_geometry::{
     Mesh,
     components::{Piece, keep_components, make_manifold, trim_border},
@@ -118,7 +119,7 @@ fn filled_percent(mesh: &Mesh) -> f64 {
     let Some(marks) = mesh.attributes.get(FILLED) else { return 0.0 };
     let (mut filled, mut all) = (0.0, 0.0);
     for (t, triangle) in mesh.triangles.iter().enumerate() {
-        let [a, b, c] = mesh.corners(t).map(|p| p.cast::<f64>());
+        let [a, b, c] = mesh.corners(t).map(Point3::cast::<f64>);
         let area = (b - a).cross(&(c - a)).norm();
         all += area;
         filled += area * triangle.iter().map(|&v| f64::from(marks[v as usize])).sum::<f64>() / 3.0;

@@ -149,7 +149,7 @@ mod tests {
             rig_from_depth: Rigid::identity(),
             fps: 30.0,
         };
-        let mut view = View::new(&depth, &[1.5; 80 * 60], 2);
+        let mut view = View::new(&depth, &vec![1.5; 80 * 60], 2);
         view.add_colors(&RgbImage { width: 80, height: 60, pixels: vec![[9, 8, 7]; 80 * 60] }, &sensor);
         for i in (0..80 * 60).filter(|i| view.elements[*i].is_some()) {
             let is_seen = (20..60).contains(&(i % 80)) && (15..45).contains(&(i / 80));

@@ -27,9 +27,10 @@ pub(crate) fn settle_closed_patches(mut labels: Labels, on: &Measured) -> Labels
         let patch = &patches[patch_of[v] as usize];
         let along = evidence.facing[v] > ALONG && evidence.height[v].abs() < NEAR;
         let along_body = evidence.body_facing[v] > ALONG && evidence.body_distance[v] < 2.0 * NEAR;
-        let is_garment = match patch.bone_passes {
-            true => labels.garment[v] && along && along_body,
-            false => patch.is_surrounded() || (labels.garment[v] && along),
+        let is_garment = if patch.bone_passes {
+            labels.garment[v] && along && along_body
+        } else {
+            patch.is_surrounded() || (labels.garment[v] && along)
         };
         labels.decide(v, is_garment, Reason::ClosedPatch);
     }

@@ -17,7 +17,7 @@ const LIMIT: f32 = 7.0;
 pub(super) fn log_odds(on: &Measured, garment_type: GarmentType, earlier: Option<&Labels>) -> Vec<f32> {
     let (graph, evidence) = (&on.graph, &on.evidence);
     let prior = template::log_odds(garment_type);
-    let colors = earlier.map(|l| color_model(graph, l)).unwrap_or_else(|| vec![0.0; graph.len()]);
+    let colors = earlier.map_or_else(|| vec![0.0; graph.len()], |l| color_model(graph, l));
     let at = |v: usize| {
         let place: f32 = evidence.parts[v].iter().zip(&prior).map(|(share, p)| share * p).sum();
         let trust = if graph.filled[v] > 0.5 { FILLED_TRUST } else { 1.0 };

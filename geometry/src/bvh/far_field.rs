@@ -52,9 +52,10 @@ impl Sum {
     }
 
     fn far_field(&self, node: &Node) -> FarField {
-        let center = match self.area > 0.0 {
-            true => Point3::from((self.center / self.area).cast::<f32>()),
-            false => nalgebra::center(&node.lo, &node.hi),
+        let center = if self.area > 0.0 {
+            Point3::from((self.center / self.area).cast::<f32>())
+        } else {
+            nalgebra::center(&node.lo, &node.hi)
         };
         FarField { dipole: self.dipole.cast(), center, radius: (node.hi - center).sup(&(center - node.lo)).norm() }
     }

@@ -13,6 +13,8 @@ mod tests;
 
 pub use scalar::Scalar;
 
+use pulp::{bytemuck::Pod, cast};
+
 use crate::element::Element;
 
 /// Number of lanes.
@@ -25,14 +27,20 @@ const ROUNDER: f32 = 12_582_912.0;
 #[allow(clippy::wrong_self_convention)]
 pub trait Lanes: Copy + Send + Sync {
     /// Sixteen floats.
-    type F: Copy;
+    type F: Pod;
     /// Sixteen Booleans.
     type M: Copy;
 
     /// Sixteen floats from memory.
-    fn load(self, values: &[f32; LANES]) -> Self::F;
+    #[inline(always)]
+    fn load(self, values: &[f32; LANES]) -> Self::F {
+        cast(*values)
+    }
     /// Sixteen floats to memory.
-    fn store(self, a: Self::F) -> [f32; LANES];
+    #[inline(always)]
+    fn store(self, a: Self::F) -> [f32; LANES] {
+        cast(a)
+    }
     /// The same value in every lane.
     fn splat(self, value: f32) -> Self::F;
     /// a + b.

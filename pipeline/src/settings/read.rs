@@ -70,12 +70,11 @@ fn field_at(text: &str, span: &Range<usize>) -> String {
     let line = text[start..].lines().next().unwrap_or_default().trim();
     let table = |line: &str| line.strip_prefix('[').and_then(|l| l.split(']').next()).map(|t| t.trim().to_string());
     let above = text[..start].lines().rev().find_map(|l| table(l.trim()));
-    match table(line) {
-        Some(own) => own,
-        None => {
-            let key = line.split('=').next().unwrap_or_default().trim();
-            above.into_iter().chain([key.to_string()]).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(".")
-        }
+    if let Some(own) = table(line) {
+        own
+    } else {
+        let key = line.split('=').next().unwrap_or_default().trim();
+        above.into_iter().chain([key.to_string()]).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(".")
     }
 }
 

@@ -78,7 +78,7 @@ impl Capture {
                 return Err(error);
             }
         };
-        let mut answer = self.answer(&recorded, &take, kept);
+        let mut answer = answer(&recorded, &take, kept.as_deref());
         answer.lost.extend(match &self.rig {
             Some(file) => RigFile::read(file)?.damage()?,
             None => self.device.damage()?.into_iter().collect(),
@@ -115,53 +115,50 @@ impl Capture {
     }
 
     fn open(&self, subject: &Subject, pending: &PendingTake) -> Result<(Box<dyn Source>, Pace), StudioError> {
-        match &self.rig {
-            Some(file) => {
-                let rig = RigFile::read(file)?;
-                Ok((rig.open(subject, &pending.layer)?, rig.pace()))
-            }
-            None => {
-                let (depth, pace) = (self.device.open(subject, &pending.layer)?, self.device.pace());
-                let source = match &self.color {
-                    Some(color) => color.beside(depth, pace)?,
-                    None => depth,
-                };
-                Ok((source, pace))
-            }
+        if let Some(file) = &self.rig {
+            let rig = RigFile::read(file)?;
+            Ok((rig.open(subject, &pending.layer)?, rig.pace()))
+        } else {
+            let (depth, pace) = (self.device.open(subject, &pending.layer)?, self.device.pace());
+            let source = match &self.color {
+                Some(color) => color.beside(depth, pace)?,
+                None => depth,
+            };
+            Ok((source, pace))
         }
     }
+}
 
-    fn answer(&self, recorded: &Recorded, take: &Path, kept: Option<PathBuf>) -> Answer {
-        let Recorded { frames, bytes, lost, unpaired, broken, failed, seen } = recorded;
-        let (angle, unseen) = (seen.turn.angle().to_degrees(), seen.turn.unseen());
-        let (take, kept) = (printable_path(take), kept.as_deref().map(printable_path));
-        let mut text = format!("{take}: {frames} frames, turned {angle:.0}°\n");
-        if let Some(kept) = &kept {
-            text.push_str(&format!("the old take is kept as {kept}\n"));
-        }
-        let mut warnings = Vec::new();
-        if let Some(failed) = failed {
-            warnings.push(format!("{failed} (the take has every frame that came)"));
-        }
-        if *lost > 0 {
-            warnings.push(format!("{lost} frames were lost between camera and computer; the others are whole"));
-        }
-        if *unpaired > 0 {
-            warnings.push(format!("{unpaired} frames have only depth or only colour"));
-        }
-        if !seen.turn.came_round() {
-            let sides = if unseen.is_empty() { String::new() } else { format!("; not seen: {}", unseen.join(", ")) };
-            warnings.push(format!(
-                "the preview followed {angle:.0}° of the turn{sides}; record again with --retake where a side is missing"
-            ));
-        }
-        let results = json!({
-            "take": take, "frames": frames, "bytes": bytes, "lost": lost, "unpaired": unpaired, "kept": kept,
-            "turned_degrees": angle, "unseen": unseen, "ended": failed,
-            "preview": { "fused": seen.fused, "unplaced": seen.unplaced, "skipped": seen.skipped },
-        });
-        Answer { text, results, warnings, lost: broken.clone(), ..Answer::default() }
+fn answer(recorded: &Recorded, take: &Path, kept: Option<&Path>) -> Answer {
+    let Recorded { frames, bytes, lost, unpaired, broken, failed, seen } = recorded;
+    let (angle, unseen) = (seen.turn.angle().to_degrees(), seen.turn.unseen());
+    let (take, kept) = (printable_path(take), kept.map(printable_path));
+    let mut text = format!("{take}: {frames} frames, turned {angle:.0}°\n");
+    if let Some(kept) = &kept {
+        text.push_str(&format!("the old take is kept as {kept}\n"));
     }
+    let mut warnings = Vec::new();
+    if let Some(failed) = failed {
+        warnings.push(format!("{failed} (the take has every frame that came)"));
+    }
+    if *lost > 0 {
+        warnings.push(format!("{lost} frames were lost between camera and computer; the others are whole"));
+    }
+    if *unpaired > 0 {
+        warnings.push(format!("{unpaired} frames have only depth or only colour"));
+    }
+    if !seen.turn.came_round() {
+        let sides = if unseen.is_empty() { String::new() } else { format!("; not seen: {}", unseen.join(", ")) };
+        warnings.push(format!(
+            "the preview followed {angle:.0}° of the turn{sides}; record again with --retake where a side is missing"
+        ));
+    }
+    let results = json!({
+        "take": take, "frames": frames, "bytes": bytes, "lost": lost, "unpaired": unpaired, "kept": kept,
+        "turned_degrees": angle, "unseen": unseen, "ended": failed,
+        "preview": { "fused": seen.fused, "unplaced": seen.unplaced, "skipped": seen.skipped },
+    });
+    Answer { text, results, warnings, lost: broken.clone(), ..Answer::default() }
 }
 
 /// True once Ctrl-C was pressed; a second time ends the program at once (the `.part` stays readable).

@@ -79,7 +79,7 @@ impl Person {
             (None, Some(scan), Some(out)) => {
                 let mut edits = self.edits.as_deref().map(BodyEdits::read).transpose()?.unwrap_or_default();
                 edits.dressed |= self.dressed;
-                Ok((fit_scan(scan, out, edits, self.settings.as_deref(), session)?, out.clone()))
+                Ok((fit_scan(scan, out, &edits, self.settings.as_deref(), session)?, out.clone()))
             }
             _ => Err(StudioError::Usage("give a subject, or --scan MESH with --out DIR".into())),
         }
@@ -103,7 +103,7 @@ impl Fit {
 fn fit_scan(
     scan: &Path,
     out: &Path,
-    edits: BodyEdits,
+    edits: &BodyEdits,
     settings_file: Option<&Path>,
     session: &Session,
 ) -> Result<Answer, StudioError> {
@@ -118,7 +118,7 @@ fn fit_scan(
     );
     session.progress.plan(FitStep::SECONDS);
     let model = BodyModel::load_default()?;
-    let record = run.step(&FitStep::of_scan(&run, &model, scan, out, &edits))?;
+    let record = run.step(&FitStep::of_scan(&run, &model, scan, out, edits))?;
     let files: Vec<String> = FILES.iter().chain(&["pose.json"]).map(|f| printable_path(&out.join(f))).collect();
     Ok(Answer {
         text: files.iter().map(|f| format!("{f}\n")).collect(),

@@ -59,7 +59,7 @@ impl Import {
             return Ok(answer);
         }
         match self.import(&mut opened, &mut subject, session) {
-            Ok((report, take, kept)) => Ok(self.answer(opened.lost, &report, &take, kept)),
+            Ok((report, take, kept)) => Ok(self.answer(opened.lost, &report, &take, kept.as_deref())),
             Err(error) => {
                 subject.give_up();
                 Err(error)
@@ -101,14 +101,14 @@ impl Import {
         Ok((report, take, kept))
     }
 
-    fn answer(&self, torn: Vec<String>, report: &ImportReport, take: &Path, kept: Option<PathBuf>) -> Answer {
+    fn answer(&self, torn: Vec<String>, report: &ImportReport, take: &Path, kept: Option<&Path>) -> Answer {
         let mut lost = torn;
         if !report.is_complete() {
             let missing = missing_numbers(take);
             let numbers = if missing.is_empty() { String::new() } else { format!(" ({})", missing.join(", ")) };
             lost.push(format!("{}: {report}{numbers}; everything else is in the take", printable_path(&self.folder)));
         }
-        let (take, kept) = (printable_path(take), kept.as_deref().map(printable_path));
+        let (take, kept) = (printable_path(take), kept.map(printable_path));
         let mut text = format!("{take}: {} frames\n", report.frames);
         if let Some(kept) = &kept {
             text.push_str(&format!("the old take is kept as {kept}\n"));

@@ -188,7 +188,7 @@ fn distance(y: usize, settings: DecodeSettings, tables: &Tables, rings: &mut Rin
     }
     let row = &mut rings.depths[y % 3];
     let mut range = [0.0; COLUMNS];
-    unwrap_row(&a, &b, Distances { range: &mut range, light: &mut row.light });
+    unwrap_row(&a, &b, &mut Distances { range: &mut range, light: &mut row.light });
     let (z, parallax) = (&tables.z[y], &tables.parallax[y]);
     for x in 0..COLUMNS {
         // With the light beside the lens the way is not twice the distance (libfreenect2 `processPixelStage2`).

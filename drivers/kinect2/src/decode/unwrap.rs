@@ -34,7 +34,7 @@ pub struct Distances<'a> {
 
 /// Unwraps a row: phasors of the three frequencies in the order of the packet (80, 16 and 120 MHz).
 #[inline(always)]
-pub fn unwrap_row(a: &[Row<f32>; 3], b: &[Row<f32>; 3], out: Distances<'_>) {
+pub fn unwrap_row(a: &[Row<f32>; 3], b: &[Row<f32>; 3], out: &mut Distances<'_>) {
     for x in 0..COLUMNS {
         let (a, b) = ([a[0][x], a[1][x], a[2][x]], [b[0][x], b[1][x], b[2][x]]);
         let delay = [angle(a[0], b[0]), angle(a[1], b[1]), angle(a[2], b[2])];

@@ -90,7 +90,7 @@ impl Content for Rendered {
     }
 
     fn yuyv(&mut self, frame: u64, size: (u16, u16)) -> Vec<u8> {
-        let mut bytes: Vec<u8> = self.frame(frame).1.as_chunks::<2>().0.iter().flat_map(yuyv).collect();
+        let mut bytes: Vec<u8> = self.frame(frame).1.as_chunks::<2>().0.iter().copied().flat_map(yuyv).collect();
         bytes.resize(2 * count(size), 128);
         bytes
     }
@@ -117,7 +117,7 @@ impl Content for Rendered {
 }
 
 /// Two pixels by ITU-R BT.601, studio range; the colour is the first one's.
-fn yuyv(pixels: &[[u8; 3]; 2]) -> [u8; 4] {
+fn yuyv(pixels: [[u8; 3]; 2]) -> [u8; 4] {
     let weigh = |p: [u8; 3], w: [f64; 3], offset: f64| {
         let sum: f64 = p.iter().zip(w).map(|(c, w)| f64::from(*c) * w).sum();
         (sum / 255.0 + offset).round().clamp(0.0, 255.0) as u8

@@ -97,6 +97,6 @@ mod tests {
         assert_eq!(frame.len().div_ceil(Stream::Depth.payload()), 242);
         let last = packet(Stream::Depth, &frame, 241, 9, 5);
         assert_eq!((last.len(), last[3], last[5]), (12 + 422_400 - 241 * 1748, 0x75, 9));
-        assert_eq!(packet(Stream::Video, &[0; 307_200], 0, 0, 5)[3..12], [0x81, 0, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(packet(Stream::Video, &vec![0; 307_200], 0, 0, 5)[3..12], [0x81, 0, 0, 0, 0, 0, 0, 0, 0]);
     }
 }

@@ -201,7 +201,10 @@ fn status_of(code: i32) -> TransferStatus {
 }
 
 fn error_of(code: i32) -> rusb::Error {
-    use rusb::constants::*;
+    use rusb::constants::{
+        LIBUSB_ERROR_BUSY, LIBUSB_ERROR_INVALID_PARAM, LIBUSB_ERROR_IO, LIBUSB_ERROR_NO_DEVICE, LIBUSB_ERROR_NO_MEM,
+        LIBUSB_ERROR_NOT_FOUND, LIBUSB_ERROR_NOT_SUPPORTED,
+    };
     match code {
         LIBUSB_ERROR_NO_DEVICE => rusb::Error::NoDevice,
         LIBUSB_ERROR_NOT_FOUND => rusb::Error::NotFound,

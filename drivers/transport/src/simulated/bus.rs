@@ -41,7 +41,7 @@ impl SimulatedBus {
     /// Pulls the device at this address out; an open one notices at its next request.
     pub fn unplug(&self, info: &DeviceInfo) {
         let mut ports = self.ports();
-        ports.plugged.iter().filter(|p| p.info == *info).for_each(|p| p.leave());
+        ports.plugged.iter().filter(|p| p.info == *info).for_each(Plugged::leave);
         ports.plugged.retain(|p| p.info != *info);
     }
 
@@ -49,7 +49,7 @@ impl SimulatedBus {
     pub(super) fn plugged(&self) -> Vec<Plugged> {
         let mut ports = self.ports();
         // A device that unplugged itself is off the bus.
-        ports.plugged.retain(|p| p.is_here());
+        ports.plugged.retain(Plugged::is_here);
         ports.plugged.clone()
     }
 

@@ -28,6 +28,12 @@ pub trait Streams {
     /// Nothing more comes: what waits for a partner goes on alone.
     fn finish(&mut self);
 
+    /// Switches the streams off for good; `answers`: whether the camera is thought to hear it. By default nothing is done,
+    /// for streams that end when they are dropped.
+    fn stop(&mut self, answers: bool) {
+        let _ = answers;
+    }
+
     /// The error where no frame came for `limit`, and again for `limit` after a restart.
     fn silent(limit: Duration) -> Self::Error;
 }
@@ -43,7 +49,7 @@ pub enum Progress {
     TimedOut,
 }
 
-/// A camera that streams.
+/// A camera that streams; its streams are stopped when this is dropped.
 #[derive(Debug)]
 pub struct Streaming<S: Streams> {
     streams: S,
@@ -70,6 +76,20 @@ impl<S: Streams> Streaming<S> {
     pub fn new(streams: S, limit: Duration) -> Self {
         let (silence, course) = (Duration::ZERO, Course::Running);
         Self { streams, limit, silence, given: 0, given_at_restart: None, restarts: 0, course }
+    }
+
+    /// Switches streams on by `start` and drives them. Where `start` fails half-way, what is on already is stopped.
+    ///
+    /// # Errors
+    /// What `start` says.
+    pub fn start(
+        streams: S,
+        limit: Duration,
+        start: impl FnOnce(&mut S) -> Result<(), S::Error>,
+    ) -> Result<Self, S::Error> {
+        let mut streaming = Self::new(streams, limit);
+        start(&mut streaming.streams)?;
+        Ok(streaming)
     }
 
     /// The next frame; `None` at the end.
@@ -99,7 +119,7 @@ impl<S: Streams> Streaming<S> {
         &self.streams
     }
 
-    /// The streams, to set their controls or to switch them off.
+    /// The streams, to set their controls.
     pub fn streams_mut(&mut self) -> &mut S {
         &mut self.streams
     }
@@ -136,8 +156,16 @@ impl<S: Streams> Streaming<S> {
     }
 }
 
+impl<S: Streams> Drop for Streaming<S> {
+    fn drop(&mut self) {
+        self.streams.stop(self.is_running());
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::{cell::Cell, rc::Rc};
+
     use super::*;
 
     /// Steps that are written down: what each brings, and whether a frame is ready after it.
@@ -146,6 +174,7 @@ mod tests {
         ready: Vec<u32>,
         next: u32,
         waits: bool,
+        stopped: Rc<Cell<Option<bool>>>,
     }
 
     impl Streams for Script {
@@ -175,18 +204,25 @@ mod tests {
             }
         }
 
+        fn stop(&mut self, answers: bool) {
+            self.stopped.set(Some(answers));
+        }
+
         fn silent(_limit: Duration) -> &'static str {
             "silent"
         }
+    }
+
+    fn script(steps: &[(Progress, bool)], waits: bool) -> Script {
+        let steps: Vec<_> = steps.iter().copied().map(Ok).collect();
+        Script { steps: steps.into_iter(), ready: Vec::new(), next: 0, waits, stopped: Rc::default() }
     }
 
     const QUARTER: Progress = Progress::Silence(Duration::from_millis(25));
 
     /// Frames and errors of a script with a limit of 100 ms, up to its end, and the restarts.
     fn run(steps: &[(Progress, bool)], waits: bool) -> (Vec<Result<u32, &'static str>>, u32) {
-        let steps: Vec<_> = steps.iter().copied().map(Ok).collect();
-        let script = Script { steps: steps.into_iter(), ready: Vec::new(), next: 0, waits };
-        let mut streaming = Streaming::new(script, Duration::from_millis(100));
+        let mut streaming = Streaming::new(script(steps, waits), Duration::from_millis(100));
         let results = std::iter::from_fn(|| streaming.next_frame().transpose()).collect();
         (results, streaming.restarts())
     }
@@ -211,6 +247,28 @@ mod tests {
         let almost = [(QUARTER, false); 4];
         let steps = [&almost[..], &[(Progress::Picture, false)], &almost].concat();
         assert_eq!(run(&steps, false), (vec![Err("unplugged")], 0));
+    }
+
+    #[test]
+    fn streams_are_stopped_at_the_end_and_after_a_failed_start() {
+        let limit = Duration::from_millis(100);
+        let running = script(&[(Progress::Picture, true)], false);
+        let stopped = Rc::clone(&running.stopped);
+        let mut streaming = Streaming::start(running, limit, |_| Ok(())).expect("nothing fails");
+        assert_eq!((streaming.next_frame(), stopped.get()), (Ok(Some(0)), None));
+        drop(streaming);
+        assert_eq!(stopped.get(), Some(true));
+
+        let failing = script(&[], false);
+        let stopped = Rc::clone(&failing.stopped);
+        assert_eq!(Streaming::start(failing, limit, |_| Err("refused")).err(), Some("refused"));
+        assert_eq!(stopped.get(), Some(true));
+
+        // A camera that is gone is not told.
+        let gone = script(&[], false);
+        let stopped = Rc::clone(&gone.stopped);
+        assert_eq!(Streaming::new(gone, limit).next_frame(), Err("unplugged"));
+        assert_eq!(stopped.get(), Some(false));
     }
 
     #[test]

@@ -1,7 +1,22 @@
-//! What all cameras that stream have in common: how they are driven and restarted, and how their frames are numbered.
+//! What all cameras that stream have in common: how they are driven and restarted, how their frames are numbered, and what
+//! may come beside depth.
 
 mod driver;
 mod numbering;
+mod transfers;
 
 pub use driver::{Progress, Streaming, Streams};
 pub use numbering::Numbering;
+pub use transfers::next_transfer;
+
+/// What comes beside depth, of cameras that have colour and infrared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum VideoMode {
+    /// Colour.
+    #[default]
+    Color,
+    /// What the depth camera sees, as grey.
+    Infrared,
+    /// Nothing.
+    Off,
+}

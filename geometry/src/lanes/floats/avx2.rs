@@ -16,14 +16,6 @@ impl Lanes for Avx2 {
     type M = [__m256; 2];
 
     #[inline(always)]
-    fn load(self, values: &[f32; LANES]) -> Self::F {
-        cast(*values)
-    }
-    #[inline(always)]
-    fn store(self, a: Self::F) -> [f32; LANES] {
-        cast(a)
-    }
-    #[inline(always)]
     fn splat(self, value: f32) -> Self::F {
         [self.0.avx._mm256_set1_ps(value); 2]
     }

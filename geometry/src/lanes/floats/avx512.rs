@@ -16,14 +16,6 @@ impl Lanes for Avx512 {
     type M = __mmask16;
 
     #[inline(always)]
-    fn load(self, values: &[f32; LANES]) -> Self::F {
-        cast(*values)
-    }
-    #[inline(always)]
-    fn store(self, a: Self::F) -> [f32; LANES] {
-        cast(a)
-    }
-    #[inline(always)]
     fn splat(self, value: f32) -> Self::F {
         self.0.avx512f._mm512_set1_ps(value)
     }

@@ -17,14 +17,6 @@ impl Lanes for Scalar {
     type M = [bool; LANES];
 
     #[inline(always)]
-    fn load(self, values: &[f32; LANES]) -> Self::F {
-        *values
-    }
-    #[inline(always)]
-    fn store(self, a: Self::F) -> [f32; LANES] {
-        a
-    }
-    #[inline(always)]
     fn splat(self, value: f32) -> Self::F {
         [value; LANES]
     }

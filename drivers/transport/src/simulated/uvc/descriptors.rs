@@ -68,7 +68,7 @@ pub fn functions(configuration: &[u8]) -> Vec<Function> {
                 }
             }
             (0x24, 1, 1) => {
-                found.push((Function { interface, ..Function::default() }, bytes[12.min(bytes.len())..].to_vec()))
+                found.push((Function { interface, ..Function::default() }, bytes[12.min(bytes.len())..].to_vec()));
             }
             (0x24, 6, 1) => found.iter_mut().for_each(|(f, _)| {
                 if f.interface == interface {
@@ -79,7 +79,7 @@ pub fn functions(configuration: &[u8]) -> Vec<Function> {
                 s.formats.push(StreamFormat { index: byte(3), code: code(byte(2), bytes), sizes: Vec::new() });
             }),
             (0x24, 5 | 7, 2) => {
-                here.and_then(|s| s.formats.last_mut()).into_iter().for_each(|f| f.sizes.push(size(bytes)))
+                here.and_then(|s| s.formats.last_mut()).into_iter().for_each(|f| f.sizes.push(size(bytes)));
             }
             (5, endpoint, 2) => here.into_iter().for_each(|s| {
                 s.endpoint = endpoint;
