@@ -13,6 +13,7 @@ use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals};
 
 use super::{
     elastic::{Elastic, Pull},
+    floor::{draw_up, floor_of, press_flat},
     folds::{release_folds, unfolded},
     landmarks::ScanLandmark,
     radial_basis::mapped,
@@ -34,7 +35,8 @@ const HAND_FREEDOM: f64 = 0.01;
 /// Lips and toes are folded finer than a scan shows: there the normals may differ by this share of the usual cosine.
 const FOLDED: f64 = 0.5;
 
-/// The template's vertices moved from the posed model onto the scan, in the scan's pose.
+/// The template's vertices moved from the posed model onto the scan, in the scan's pose; soles stay above the floor that
+/// it stands on.
 ///
 /// # Errors
 /// [`FittingError::Singular`] where the elastic system cannot be factorised.
@@ -57,15 +59,22 @@ pub(crate) fn conform(
     let surface = ScanSurface::new(scan, trust, bvh);
     let segments = Segments::new(model, &rest, &start);
     let elastic = Elastic::new(model, &start, &settings.conformation)?;
+    let floor = floor_of(scan);
     let mut freedom = freedom(model);
     let mut points = start.clone();
     for _ in 0..settings.conformation.rounds {
         let mut pulls = pulls(model, &points, &freedom, &surface, &segments, &settings.conformation);
+        if let Some(floor) = floor {
+            draw_up(model, &points, floor, &mut pulls);
+        }
         for &(v, target) in &anchors {
             pulls[v] = Pull { target, weight: ANCHOR };
         }
         points = elastic.solve(&start, &pulls)?;
         release_folds(model, &start, &points, &mut freedom);
+    }
+    if let Some(floor) = floor {
+        press_flat(model, &mut points, floor);
     }
     let points = unfolded(model, &posed, points);
     Ok(uncrossed(&model.triangles, &posed, points))

@@ -2,6 +2,7 @@
 
 mod deform;
 mod elastic;
+mod floor;
 mod folds;
 mod landmarks;
 mod radial_basis;

@@ -146,14 +146,18 @@ const DRESSED: Rule = Rule {
     reason: |_| "the person is dressed: shape and measures are estimated".into(),
 };
 
-/// Adults from the smallest to the tallest, metres.
+/// Adults, metres: 1.35 lies 4.3 standard deviations below the mean of ANSUR II's women (1.628 ± 0.064), 2.2 more than six
+/// above that of its men (1.756 ± 0.069).
 const STATURE: Rule = Rule {
     value: |e| e.stature,
-    doubtful: Bounds::Outside(1.2, 2.2),
+    doubtful: Bounds::Outside(1.35, 2.2),
     failed: Bounds::Outside(0.6, 2.5),
     reason: |e| {
         let stature = e.stature;
-        format!("the body would stand {stature:.2} m tall: is it a whole person, and is the scan in metres?")
+        format!(
+            "the body would stand {stature:.2} m tall, but the body model is of adults: it fits neither children nor parts \
+             of a person, and scans in metres only"
+        )
     },
 };
 

@@ -106,7 +106,7 @@ impl<'a> Fit<'a> {
 impl Step for Fit<'_> {
     type Report = FitReport;
     const NAME: &'static str = "fit";
-    const VERSION: u32 = 6;
+    const VERSION: u32 = 7;
     const SECONDS: f64 = 4.0;
 
     fn label(&self) -> String {
