@@ -34,6 +34,9 @@ mod tests {
         assert!(refused("src", 10).contains("is a folder"));
         assert!(refused("/dev/null", 10).contains("not a regular file"));
         assert!(refused("Cargo.toml", 10).contains("at most 10"));
+        let length = std::fs::metadata("Cargo.toml").unwrap().len();
+        assert!(read_limited(Path::new("Cargo.toml"), length).is_ok());
+        assert!(refused("Cargo.toml", length - 1).contains("can be read"));
         assert!(read_limited(Path::new("Cargo.toml"), 1 << 20).unwrap().starts_with(b"[package]"));
     }
 }

@@ -73,6 +73,9 @@ mod tests {
         assert_eq!((error.file(), error.field_name()), (Some(Path::new("a.json")), Some("frames[1]")));
         assert!(read("{").unwrap_err().to_string().starts_with("a.json: "));
         assert!(read("{} {}").is_err());
+        let inside =
+            from_value::<Vec<u32>>(Path::new("a.json"), "fit.counts", serde_json::json!([1, "two"])).unwrap_err();
+        assert_eq!(inside.field_name(), Some("fit.counts.[1]"));
     }
 
     #[test]

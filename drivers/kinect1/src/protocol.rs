@@ -149,8 +149,10 @@ mod tests {
         assert_eq!(parse_packet(Stream::Depth, &bytes[..11]), Err(PacketFault::Short));
         bytes[3] = 0x6f;
         assert_eq!(parse_packet(Stream::Depth, &bytes), Err(PacketFault::Flag));
-        bytes[0] = b'r';
-        assert_eq!(parse_packet(Stream::Depth, &bytes), Err(PacketFault::Magic));
+        for start in [*b"rB", *b"Rb"] {
+            bytes[..2].copy_from_slice(&start);
+            assert_eq!(parse_packet(Stream::Depth, &bytes), Err(PacketFault::Magic));
+        }
     }
 
     #[test]

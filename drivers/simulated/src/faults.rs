@@ -134,5 +134,6 @@ mod tests {
         faults.extend([Fault { stream: 0, frame: 1, packet: 2, what: StreamFault::Late(3) }]);
         let sent: Vec<_> = (0..8).map(|due| faults.late_packet(0, 1, due)).collect();
         assert_eq!(sent, [Some(0), Some(1), None, None, None, Some(2), Some(3), Some(4)]);
+        assert_eq!(faults.at(0, 1, 2), None, "a late packet is whole");
     }
 }

@@ -79,6 +79,12 @@ mod tests {
         let torn = picture(&[0xff, 0xd8, 1, 2], layout(PixelFormat::Mjpg, 2, 2, 0)).unwrap_err();
         assert!(torn.contains("torn"), "{torn}");
         assert!(picture(&[0xff, 0xd8, 0xff, 0xd9], layout(PixelFormat::Mjpg, 2, 2, 0)).is_err());
+        let mut whole = Vec::new();
+        let encoder = jpeg_encoder::Encoder::new(&mut whole, 90);
+        encoder.encode(&[80; 3 * 8 * 6], 8, 6, jpeg_encoder::ColorType::Rgb).unwrap();
+        assert!(picture(&whole, layout(PixelFormat::Mjpg, 8, 6, 0)).is_ok());
+        let other = picture(&whole, layout(PixelFormat::Mjpg, 6, 8, 0)).unwrap_err();
+        assert!(other.contains("8x6 pixels where 6x8"), "{other}");
     }
 
     proptest! {

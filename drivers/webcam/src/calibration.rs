@@ -95,6 +95,7 @@ mod tests {
             ("[0.0, 0.1, 0.0]", "[0.0, 52.0, 0.0]", "metres"),
             ("[0.0, 0.1, 0.0]", "[0.0, nan, 0.0]", "metres"),
             ("[0.0, 90.0, 0.0]", "[0.0, inf, 0.0]", "degrees"),
+            ("[0.0, 90.0, 0.0]", "[0.0, 361.0, 0.0]", "degrees"),
             ("rotation", "turned", "turned"),
         ] {
             let error = parse(&GOOD.replace(good, bad)).unwrap_err();

@@ -91,3 +91,63 @@ fn next_picture(source: &mut dyn Source, is_host_time: bool) -> Next {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{sync::Arc, time::Duration};
+
+    use toile_capture::{RgbImage, Rig};
+
+    use super::*;
+
+    /// Gives a hundred pictures at once, says so, and fails.
+    struct Failing {
+        rig: Rig,
+        given: u64,
+        failing: mpsc::Sender<()>,
+    }
+
+    impl Source for Failing {
+        fn rig(&self) -> &Rig {
+            &self.rig
+        }
+
+        fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
+            if self.given == 100 {
+                let _ = self.failing.send(());
+                return Err(CaptureError::Device { device: "webcam".into(), reason: "unplugged".into() });
+            }
+            self.given += 1;
+            let image = RgbImage { width: 1, height: 1, pixels: vec![[0; 3]] };
+            Ok(Some(Frame {
+                sensor: 0,
+                index: self.given - 1,
+                device_frame: self.given - 1,
+                lost_before: 0,
+                device_time_ns: 0,
+                host_time_ns: 0,
+                depth: None,
+                color: Some(ColorImage::Rgb(Arc::new(image))),
+            }))
+        }
+    }
+
+    #[test]
+    fn pictures_that_nobody_takes_are_dropped_but_a_failure_is_told() {
+        let (failing, has_failed) = mpsc::channel();
+        let mut feed = Feed::new(Box::new(Failing { rig: Rig::default(), given: 0, failing }), false, true);
+        has_failed.recv().unwrap();
+        thread::sleep(Duration::from_millis(20));
+        let (mut pictures, mut told) = (0, None);
+        while told.is_none() {
+            match feed.next(false) {
+                Some(Ok(Some(_))) => pictures += 1,
+                Some(end) => told = Some(end),
+                None => thread::sleep(Duration::from_millis(1)),
+            }
+        }
+        assert_eq!(pictures, ROOM);
+        assert!(told.is_some_and(|end| end.is_err_and(|error| error.to_string().contains("unplugged"))));
+        assert!(feed.next(true).is_none());
+    }
+}

@@ -63,6 +63,17 @@ fn colours_may_be_bytes_words_or_floats() {
 }
 
 #[test]
+fn words_with_a_sign_are_not_those_without() {
+    let read = |kind: &str, bytes: [u8; 2]| {
+        let properties = ["x", "y", "z"].map(|n| format!("property {kind} {n}")).join("\n");
+        let header = format!("ply\nformat binary_little_endian 1.0\nelement vertex 1\n{properties}\nend_header\n");
+        decode(&[header.as_bytes(), &bytes.repeat(3)].concat()).unwrap().positions[0].x
+    };
+    assert_eq!((read("short", [0xfe, 0xff]), read("int16", [0xfe, 0xff])), (-2.0, -2.0));
+    assert_eq!((read("ushort", [0xfe, 0xff]), read("uint16", [0xfe, 0xff])), (65534.0, 65534.0));
+}
+
+#[test]
 fn numbers_that_cannot_be_counts_or_indices_are_refused() {
     let elements = format!("element vertex 3\n{POINT}\nelement face 1\nproperty list int double vertex_indices");
     let face = |face: &str| ascii(&elements, &format!("0 0 0 1 0 0 0 1 0 {face}"));

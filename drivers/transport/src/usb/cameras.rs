@@ -84,6 +84,9 @@ mod tests {
         assert!(problems(&kinect2, LinkSpeed::Super, Ok(())).is_empty());
         let kinect1 = known::find(0x045e, 0x02ae).unwrap();
         assert!(problems(&kinect1, LinkSpeed::High, Ok(())).is_empty());
+        let realsense = known::find(0x8086, 0x0b07).unwrap();
+        assert_eq!(problems(&realsense, LinkSpeed::High, Ok(())).len(), 1);
+        assert!(problems(&realsense, LinkSpeed::Super, Ok(())).is_empty());
     }
 
     #[test]
