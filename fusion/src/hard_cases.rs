@@ -49,6 +49,25 @@ fn a_turn_that_is_fused_whole_stands_upright() {
 }
 
 #[test]
+fn a_camera_on_its_side_or_upside_down_gives_an_upright_scan() {
+    use crate::ImageSide::{Bottom, Left, Right};
+    for (quarters, side) in [(1.0, Left), (2.0, Bottom), (3.0, Right)] {
+        let upright = Scene::new();
+        let roll =
+            nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), quarters * std::f64::consts::FRAC_PI_2);
+        let scene = Scene { room_from_camera: upright.room_from_camera * roll, ..upright };
+        let scan = fuse(&mut scene.source(&steps(36, 10.0)), &settings(), &|_| {}).unwrap();
+        let volume = scan.report.volume.as_ref().unwrap();
+        assert!(volume.floor_found && volume.image_up == side, "{volume:?}");
+        let heights = scan.mesh.positions.iter().map(|p| p.y);
+        let (low, high) = heights.fold((f32::MAX, f32::MIN), |(low, high), y| (low.min(y), high.max(y)));
+        assert!(low.abs() < 0.02 && (high - 1.71).abs() < 0.08, "{side:?}: from {low} to {high}");
+        let radius = scan.mesh.positions.iter().map(|p| p.x.hypot(p.z)).fold(0.0, f32::max);
+        assert!(radius < 0.7, "{side:?}: something {radius} m from the axis");
+    }
+}
+
+#[test]
 fn known_poses_fill_soles_where_they_are_and_not_at_their_frames_zero() {
     let (scene, angles) = (Scene::new(), steps(12, 30.0));
     let raised = Rigid::translation(0.0, -0.8, 0.0);

@@ -39,7 +39,7 @@ pub use finish::finish;
 pub use report::{DroppedFrame, FusionReport, VolumeReport};
 pub use scan::{Scan, TrackedFrame};
 pub use settings::{FusionSettings, KnownPose, Prior, Volume};
-pub use subject::SubjectVolume;
+pub use subject::{ImageSide, SubjectVolume};
 pub use take::{Fuser, LiveFuser, Outcome, fuse, survey};
 pub use timings::{StepTiming, Timings};
 pub use tracking::Tracked;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{drop_reason::DropReason, settings::FusionSettings};
+use crate::{drop_reason::DropReason, settings::FusionSettings, subject::ImageSide};
 
 /// A frame that was not fused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -26,6 +26,8 @@ pub struct VolumeReport {
     pub bottom_m: f64,
     /// Distance of the axis from the camera, metres.
     pub axis_distance_m: f64,
+    /// The side of the image that is up.
+    pub image_up: ImageSide,
 }
 
 /// What the stage decided.
@@ -47,7 +49,8 @@ pub struct FusionReport {
     pub full_turn: bool,
     /// Degrees a second, mean.
     pub rate_deg_per_s: f64,
-    /// Tilt of the axis against the floor's normal, degrees; absent without a floor or a turn.
+    /// Tilt of the axis against the normal of the floor, or without one against the upright of the image, degrees; absent
+    /// without a turn.
     pub axis_tilt_deg: Option<f64>,
     /// Volume, where the subject was cut out.
     pub volume: Option<VolumeReport>,

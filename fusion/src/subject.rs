@@ -3,8 +3,9 @@
 mod background;
 mod cut;
 mod floor;
+mod upright;
 mod volume;
 
 pub(crate) use volume::{SURVEY_FRAMES, find_volume};
 
-pub use cut::SubjectVolume;
+pub use {cut::SubjectVolume, upright::ImageSide};

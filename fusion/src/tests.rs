@@ -4,7 +4,7 @@ use nalgebra::Point3;
 use toile_geometry::{Rigid, ply, topology::Edges};
 
 use crate::{
-    DropReason, FusionError, FusionSettings, KnownPose, Outcome, Prior, Scan, SubjectVolume, Volume,
+    DropReason, FusionError, FusionSettings, ImageSide, KnownPose, Outcome, Prior, Scan, SubjectVolume, Volume,
     field::{Tsdf, VOXELS, extract_surface, integrate, ray_cast},
     finish::{close, least_weight},
     frame::{CutDepth, Rectifier, View, drop_edges, unproject},
@@ -307,8 +307,13 @@ fn settings_out_of_range_and_missing_depth_are_refused() {
 fn column_turn(with_color: bool) -> (f64, f64, usize) {
     let scene =
         Scene { shape: column_distance, with_color, with_floor: false, with_wall: false, noise: 0.001, ..Scene::new() };
-    let volume =
-        SubjectVolume { model_from_camera: scene.room_from_camera, radius: 0.5, bottom: Some(0.0), floor: None };
+    let volume = SubjectVolume {
+        model_from_camera: scene.room_from_camera,
+        radius: 0.5,
+        bottom: Some(0.0),
+        floor: None,
+        image_up: ImageSide::Top,
+    };
     let mut fuser = crate::Fuser::new(&scene.rig(), Some(volume), settings()).unwrap();
     let angles = steps(30, 6.0);
     for frame in scene.frames(&angles) {

@@ -31,7 +31,7 @@ pub(crate) fn place(fuser: &Fuser, raw: &Mesh, report: &mut FusionReport) -> Rig
     let axis = match found.filter(|_| turned.abs() > AXIS_TURN) {
         Some(found) => {
             let axis = found.pointing_along(&up);
-            if has_floor {
+            if volume.is_some() {
                 report.axis_tilt_deg = Some(axis.direction.angle(&Vector3::y()).to_degrees());
             }
             axis

@@ -11,6 +11,8 @@ use crate::{
     timings::Timings,
 };
 
+/// An axis farther than this from the upright of the image means that the camera lies on its side, degrees.
+const LYING_DEG: f64 = 45.0;
 /// A seam wider than this means that the subject moved, millimetres.
 const OPEN_SEAM_MM: f64 = 5.0;
 
@@ -32,6 +34,7 @@ pub(crate) fn summarise(fuser: &mut Fuser, field: &FieldSize, report: &mut Fusio
         floor_found: v.floor.is_some(),
         bottom_m: v.bottom.unwrap_or(0.0),
         axis_distance_m: v.model_from_camera.translation.vector.xz().norm(),
+        image_up: v.image_up,
     });
     report.noise_mm = fuser.model.noise * 1e3;
     report.truncation_mm = f64::from(field.truncation) * 1e3;
@@ -71,6 +74,13 @@ fn warnings(report: &FusionReport) -> Vec<String> {
     }
     if report.volume.is_some() && !report.full_turn && report.turned_deg > 0.0 {
         list.push(format!("no full turn: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));
+    }
+    if report.volume.as_ref().is_some_and(|v| !v.floor_found) && report.axis_tilt_deg.is_some_and(|t| t > LYING_DEG) {
+        list.push(
+            "the subject turned about an axis that lies across the image, and no floor is in view that says which side \
+             is up: the scan may be upside down; turn the camera upright or let it see the floor"
+                .into(),
+        );
     }
     let unknown = report.dropped.iter().filter(|d| d.reason == DropReason::NoKnownPose).count();
     if unknown > 0 {

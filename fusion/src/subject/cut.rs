@@ -6,7 +6,7 @@ use toile_geometry::{
     lanes::floats::{Kernel, LANES, Lanes, dispatch, group, put_group},
 };
 
-use super::floor::Floor;
+use super::{floor::Floor, upright::ImageSide};
 use crate::frame::unproject;
 
 /// The part of space that is fused, in the model's frame: +Y up, +Z towards the camera at the first frame, origin
@@ -21,6 +21,8 @@ pub struct SubjectVolume {
     pub bottom: Option<f64>,
     /// The floor plane, camera frame.
     pub floor: Option<Floor>,
+    /// The side of the image that is up.
+    pub image_up: ImageSide,
 }
 
 impl SubjectVolume {

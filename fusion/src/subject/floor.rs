@@ -6,7 +6,7 @@ use toile_geometry::camera::PinholeCamera;
 use super::background::Resting;
 use crate::frame::{surface_elements, unproject};
 
-/// Largest angle between the floor's normal and the image's upward direction, as a cosine (40°).
+/// Largest angle between the floor's normal and the direction that is up in the image, as a cosine (40°).
 const UPWARD: f32 = 0.77;
 /// Largest angle between a pixel's normal and its plane's, as a cosine (25°).
 const ALIGNED: f64 = 0.906;
@@ -46,24 +46,29 @@ pub struct Floor {
     pub margin: f64,
 }
 
-struct Upward {
+struct LevelPixel {
     point: Point3<f64>,
     normal: Vector3<f64>,
     /// Standard deviation of a single frame's depth, metres.
     noise: f64,
 }
 
-impl Upward {
+impl LevelPixel {
     /// Standard deviation of a single frame's height over a plane through the pixel: noise lies along the ray.
     fn height_noise(&self, normal: &Vector3<f64>) -> f64 {
         self.noise * self.point.coords.dot(normal).abs() / self.point.z.max(1e-6)
     }
 }
 
-/// Looks for the plane under the moving `subject` (camera frame) in the background depth; `None` where there is no
-/// level patch below it.
-pub(crate) fn find_floor(camera: &PinholeCamera, resting: &Resting, subject: &[Point3<f32>]) -> Option<Floor> {
-    let pixels = upward_pixels(camera, resting);
+/// Looks for the plane under the moving `subject` (camera frame) in the background depth, where `up` (camera frame) is
+/// roughly upward; `None` where there is no level patch below it.
+pub(crate) fn find_floor(
+    camera: &PinholeCamera,
+    resting: &Resting,
+    subject: &[Point3<f32>],
+    up: &Vector3<f64>,
+) -> Option<Floor> {
+    let pixels = upward_pixels(camera, resting, &up.cast());
     if pixels.len() < LEAST_PIXELS {
         return None;
     }
@@ -76,7 +81,7 @@ pub(crate) fn find_floor(camera: &PinholeCamera, resting: &Resting, subject: &[P
     Some(disk_on(&pixels, subject, normal, point))
 }
 
-fn upward_pixels(camera: &PinholeCamera, resting: &Resting) -> Vec<Upward> {
+fn upward_pixels(camera: &PinholeCamera, resting: &Resting, up: &Vector3<f32>) -> Vec<LevelPixel> {
     let (w, h) = (camera.width as usize, camera.height as usize);
     let elements = surface_elements(camera, &resting.depth, 3);
     let mut pixels = Vec::new();
@@ -84,11 +89,11 @@ fn upward_pixels(camera: &PinholeCamera, resting: &Resting) -> Vec<Upward> {
         for x in (0..w).step_by(2) {
             let element = elements[y * w + x];
             let [rx, ry, _] = unproject(camera, x as f32, y as f32, 1.0);
-            let normal = element.normal(rx, ry);
-            if element.is_some() && -normal[1] > UPWARD {
+            let normal = Vector3::from(element.normal(rx, ry));
+            if element.is_some() && normal.dot(up) > UPWARD {
                 let point = Point3::new(rx, ry, 1.0) * element.depth();
                 let noise = f64::from(resting.noise[y * w + x]);
-                pixels.push(Upward { point: point.cast(), normal: Vector3::from(normal).cast(), noise });
+                pixels.push(LevelPixel { point: point.cast(), normal: normal.cast(), noise });
             }
         }
     }
@@ -97,33 +102,38 @@ fn upward_pixels(camera: &PinholeCamera, resting: &Resting) -> Vec<Upward> {
 
 /// The plane with the largest number of members among those through single pixels, refined by least squares, and its
 /// members' share.
-fn best_plane(pixels: &[Upward]) -> Option<(Vector3<f64>, Point3<f64>, f64)> {
+fn best_plane(pixels: &[LevelPixel]) -> Option<(Vector3<f64>, Point3<f64>, f64)> {
     let step = (pixels.len() / 97).max(1);
     let candidates = pixels.iter().step_by(step);
     let best = candidates.max_by_key(|c| members(pixels, &smoothed_normal(pixels, c), &c.point, 3).len())?;
     let (mut normal, mut point) = (smoothed_normal(pixels, best), best.point);
     for _ in 0..5 {
         let group = members(pixels, &normal, &point, 1);
-        (normal, point) = fit_plane(&group.iter().map(|u| u.point).collect::<Vec<_>>())?;
+        (normal, point) = fit_plane(&group.iter().map(|u| u.point).collect::<Vec<_>>(), &normal)?;
     }
     let share = members(pixels, &normal, &point, 1).len() as f64 / pixels.len() as f64;
     Some((normal, point, share))
 }
 
 /// A pixel's normal averaged with the aligned ones of nearby pixels.
-fn smoothed_normal(pixels: &[Upward], center: &Upward) -> Vector3<f64> {
+fn smoothed_normal(pixels: &[LevelPixel], center: &LevelPixel) -> Vector3<f64> {
     let near =
         pixels.iter().filter(|u| (u.point - center.point).norm() < 0.15 && u.normal.dot(&center.normal) > ALIGNED);
     near.map(|u| u.normal).sum::<Vector3<f64>>().try_normalize(1e-9).unwrap_or(center.normal)
 }
 
-fn members<'a>(pixels: &'a [Upward], normal: &Vector3<f64>, point: &Point3<f64>, step: usize) -> Vec<&'a Upward> {
-    let belongs = |u: &&Upward| (u.point - point).dot(normal).abs() < BAND && u.normal.dot(normal) > ALIGNED;
+fn members<'a>(
+    pixels: &'a [LevelPixel],
+    normal: &Vector3<f64>,
+    point: &Point3<f64>,
+    step: usize,
+) -> Vec<&'a LevelPixel> {
+    let belongs = |u: &&LevelPixel| (u.point - point).dot(normal).abs() < BAND && u.normal.dot(normal) > ALIGNED;
     pixels.iter().step_by(step).filter(belongs).collect()
 }
 
 /// Standard deviation of a plane's members along its narrower direction.
-fn spread(pixels: &[Upward], normal: &Vector3<f64>, point: &Point3<f64>) -> f64 {
+fn spread(pixels: &[LevelPixel], normal: &Vector3<f64>, point: &Point3<f64>) -> f64 {
     let group = members(pixels, normal, point, 1);
     let mean = group.iter().map(|u| u.point.coords).sum::<Vector3<f64>>() / group.len().max(1) as f64;
     let scatter: Matrix3<f64> =
@@ -133,8 +143,8 @@ fn spread(pixels: &[Upward], normal: &Vector3<f64>, point: &Point3<f64>) -> f64 
     (values[1].max(0.0) / group.len().max(1) as f64).sqrt()
 }
 
-/// Least-squares plane, normal towards −Y of the camera (up); `None` where there are fewer than ten points.
-fn fit_plane(points: &[Point3<f64>]) -> Option<(Vector3<f64>, Point3<f64>)> {
+/// Least-squares plane with its normal on the side of `up`; `None` where there are fewer than ten points.
+fn fit_plane(points: &[Point3<f64>], up: &Vector3<f64>) -> Option<(Vector3<f64>, Point3<f64>)> {
     if points.len() < 10 {
         return None;
     }
@@ -143,28 +153,28 @@ fn fit_plane(points: &[Point3<f64>]) -> Option<(Vector3<f64>, Point3<f64>)> {
     let eigen = SymmetricEigen::new(scatter);
     let k = eigen.eigenvalues.imin();
     let n: Vector3<f64> = eigen.eigenvectors.column(k).into();
-    Some((if n.y > 0.0 { -n } else { n }, Point3::from(mean)))
+    Some((if n.dot(up) < 0.0 { -n } else { n }, Point3::from(mean)))
 }
 
 /// The highest well-filled level parallel to the floor within the subject's reach: the disk, or the floor itself.
-fn disk_on(pixels: &[Upward], subject: &[Point3<f32>], normal: Vector3<f64>, point: Point3<f64>) -> Floor {
+fn disk_on(pixels: &[LevelPixel], subject: &[Point3<f32>], normal: Vector3<f64>, point: Point3<f64>) -> Floor {
     let center = footing(subject, &normal, &point);
     let across = |v: Vector3<f64>| (v - normal * v.dot(&normal)).norm();
-    let near: Vec<&Upward> =
+    let near: Vec<&LevelPixel> =
         pixels.iter().filter(|u| u.normal.dot(&normal) > ALIGNED && across(u.point - center) < DISK_REACH).collect();
     let heights: Vec<f64> = near.iter().map(|u| (u.point - point).dot(&normal)).collect();
     let (mut n, mut on) = (normal, point + normal * highest_level(&heights));
-    let mut level: Vec<&Upward> = Vec::new();
+    let mut level: Vec<&LevelPixel> = Vec::new();
     for band in [BAND, 0.5 * BAND, 0.5 * BAND] {
         level = near.iter().copied().filter(|u| (u.point - on).dot(&n).abs() < band).collect();
         let points: Vec<Point3<f64>> = level.iter().map(|u| u.point).collect();
-        (n, on) = fit_plane(&points).unwrap_or((n, on));
+        (n, on) = fit_plane(&points, &n).unwrap_or((n, on));
     }
     Floor { normal: n, point: on, margin: margin(&level, &n, &on) }
 }
 
 /// Height over a level above which a single frame's pixels are not the level's own: unevenness and noise together.
-fn margin(level: &[&Upward], normal: &Vector3<f64>, point: &Point3<f64>) -> f64 {
+fn margin(level: &[&LevelPixel], normal: &Vector3<f64>, point: &Point3<f64>) -> f64 {
     let offsets = level.iter().map(|u| (u.point - point).dot(normal).abs()).collect();
     let uneven = 1.4826 * quantile(offsets, 0.5).unwrap_or(0.003);
     let noise = level.iter().map(|u| u.height_noise(normal)).collect();

@@ -10,7 +10,8 @@ use toile_geometry::{Rigid, camera::PinholeCamera};
 use super::{
     background::Background,
     cut::SubjectVolume,
-    floor::{Floor, find_floor},
+    floor::Floor,
+    upright::{ImageSide, find_up},
 };
 use crate::{
     FusionError,
@@ -44,9 +45,8 @@ pub(crate) fn find_volume(camera: &PinholeCamera, depths: &[Vec<f32>]) -> Result
     if subject.len() * SAMPLE * SAMPLE < least {
         return Err(nobody("what moves is scattered, no single subject".into()));
     }
-    let floor = find_floor(camera, &background.resting, &subject);
-    let up = floor.as_ref().map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal);
-    Ok(cylinder(&subject, up, floor))
+    let (image_up, floor) = find_up(camera, &background.resting, &subject);
+    Ok(cylinder(&subject, image_up, floor))
 }
 
 /// Pixels between the rows, and between the columns, that the survey looks at.
@@ -105,7 +105,8 @@ fn largest_cluster(points: &[Point3<f32>]) -> Vec<Point3<f32>> {
 
 /// The cylinder about the axis: its lateral centre is the middle of the swept silhouette, its depth that of the
 /// points at the silhouette's lateral extremes, where a surface of revolution is as deep as its axis.
-fn cylinder(subject: &[Point3<f32>], up: Vector3<f64>, floor: Option<Floor>) -> SubjectVolume {
+fn cylinder(subject: &[Point3<f32>], image_up: ImageSide, floor: Option<Floor>) -> SubjectVolume {
+    let up = floor.as_ref().map_or_else(|| image_up.direction(), |f| f.normal);
     let leveled_from_camera = level(up);
     let leveled: Vec<Point3<f64>> = subject.iter().map(|p| leveled_from_camera * p.cast::<f64>()).collect();
     let xs = sorted(leveled.iter().map(|p| p.x));
@@ -123,7 +124,7 @@ fn cylinder(subject: &[Point3<f32>], up: Vector3<f64>, floor: Option<Floor>) -> 
     };
     let shift = Translation3::new(-x, -ground, -z);
     let bottom = floor.as_ref().map(|f| f.margin);
-    SubjectVolume { model_from_camera: shift * leveled_from_camera, radius, bottom, floor }
+    SubjectVolume { model_from_camera: shift * leveled_from_camera, radius, bottom, floor, image_up }
 }
 
 /// Height of the floor plane at (x, z), leveled frame (where it is level by construction).

@@ -39,7 +39,7 @@ impl<'a> Fuse<'a> {
 impl Step for Fuse<'_> {
     type Report = FusionReport;
     const NAME: &'static str = "fuse";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 4;
     // A turn of 100 frames.
     const SECONDS: f64 = 9.0;
 
