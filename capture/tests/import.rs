@@ -144,7 +144,7 @@ fn real_folders_are_guessed_and_read() {
         real("turntable/noisy", Format::ToileFolder, 300, (640, 480), false, 300),
     ];
     for case in cases {
-        let Some(path) = shared(case.path) else { continue };
+        let Some(path) = toile_outside::data(case.path) else { continue };
         assert_eq!(import::guess(&path).unwrap(), case.format, "{}", case.path);
         let mut source = import::open(&path, None).unwrap();
         assert_eq!(source.frame_count(), Some(case.frames), "{}", case.path);
@@ -175,7 +175,7 @@ fn real_folders_are_guessed_and_read() {
 #[test]
 fn reference_poses_carry_the_frames_device_times() {
     for name in ["subjects/birch/00-body", "real/rgbd/uva_cv2_person_turn", "turntable/clean"] {
-        let Some(path) = shared(name) else { continue };
+        let Some(path) = toile_outside::data(name) else { continue };
         let poses = import::reference_poses(&path).unwrap().unwrap();
         let frames = all_frames(import::open(&path, None).unwrap().as_mut()).unwrap();
         for (pose, frame) in poses.iter().zip(&frames) {
@@ -186,7 +186,7 @@ fn reference_poses_carry_the_frames_device_times() {
 
 #[test]
 fn a_real_take_survives_recording_bit_by_bit() {
-    let Some(path) = shared("subjects/alder/00-body") else { return };
+    let Some(path) = toile_outside::data("subjects/alder/00-body") else { return };
     let temp = tempfile::tempdir().unwrap();
     let out = temp.path().join("00-body.mcap");
     let report = import_to(&path, &out).unwrap();
@@ -200,7 +200,7 @@ fn a_real_take_survives_recording_bit_by_bit() {
 
 #[test]
 fn masks_of_uva_cut_the_background_only_when_asked() {
-    let Some(path) = shared("real/rgbd/uva_cv2_person_turn") else { return };
+    let Some(path) = toile_outside::data("real/rgbd/uva_cv2_person_turn") else { return };
     let count = |apply_mask| {
         let mut source = import::open_with(&path, &ImportOptions { format: None, apply_mask }).unwrap();
         let depth = source.next_frame().unwrap().unwrap().depth.unwrap();
@@ -212,7 +212,7 @@ fn masks_of_uva_cut_the_background_only_when_asked() {
 
 #[test]
 fn the_turntable_folder_itself_points_to_its_parts() {
-    let Some(path) = shared("turntable") else { return };
+    let Some(path) = toile_outside::data("turntable") else { return };
     let error = import::open(&path, None).err().unwrap().to_string();
     assert!(error.contains("clean, noisy"), "{error}");
 }

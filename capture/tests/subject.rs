@@ -245,7 +245,7 @@ fn inspection_of_torn_takes_and_subjects() {
 
 #[test]
 fn real_subject_imports_and_is_healthy() {
-    let Some(data) = shared("subjects/birch") else { return };
+    let Some(data) = toile_outside::data("subjects/birch") else { return };
     let temp = tempfile::tempdir().unwrap();
     let mut subject = LockedSubject::create(&temp.path().join("birch")).unwrap();
     for (name, from) in [("body", "00-body"), ("skirt", "01-skirt")] {

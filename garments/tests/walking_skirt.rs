@@ -2,8 +2,6 @@
 
 #![allow(clippy::unwrap_used)] // all of it is test code
 
-use std::path::PathBuf;
-
 use toile_animation::{RetargetSettings, bvh, retarget, shipped_walk};
 use toile_character::Pose;
 use toile_garments::{
@@ -34,10 +32,9 @@ fn skirt_of(subject: &Subject) -> Mesh {
 
 /// The shipped walk and, where the private data is, a recorded walk and a jog.
 fn motions() -> Vec<toile_animation::Bvh> {
-    let data = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real/motion");
-    let recorded = ["bandai_a/dataset-1_walk_normal_001.bvh", "cmu_a/02_03.bvh"].map(|name| data.join(name));
-    let recorded = recorded.iter().filter(|path| path.exists()).map(|path| bvh::read(path).unwrap());
-    std::iter::once(shipped_walk().unwrap()).chain(recorded).collect()
+    let recorded = ["bandai_a/dataset-1_walk_normal_001.bvh", "cmu_a/02_03.bvh"];
+    let recorded = recorded.iter().filter_map(|name| toile_outside::data(&format!("real/motion/{name}")));
+    std::iter::once(shipped_walk().unwrap()).chain(recorded.map(|path| bvh::read(&path).unwrap())).collect()
 }
 
 #[test]

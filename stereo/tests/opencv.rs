@@ -1,8 +1,6 @@
 //! Rectification beside OpenCV's. The golden file was written by `tests/peers/stereo.py --golden`.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use std::path::Path;
-
 use nalgebra::Vector2;
 use serde_json::Value;
 use toile_stereo::{Rectification, View, calibration_of, file_storage, rectify};
@@ -35,15 +33,11 @@ fn worst(made: &Rectification, golden: &Value) -> f64 {
 #[test]
 fn rectified_pixels_come_from_where_opencv_takes_them() {
     let golden: Value = serde_json::from_str(include_str!("golden/opencv.json")).expect("the golden file is JSON");
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real/stereo");
     for case in golden["cases"].as_array().expect("there are cases") {
         let mut text = case["text"].as_str().expect("a text").to_string();
         if let Some(file) = case["intrinsics"].as_str() {
-            let Ok(intrinsics) = std::fs::read_to_string(data.join(file)) else {
-                println!("skipped: {file} is not in ../shared/data");
-                continue;
-            };
-            text += &intrinsics;
+            let Some(path) = toile_outside::data(&format!("real/stereo/{file}")) else { continue };
+            text += &std::fs::read_to_string(path).expect("the intrinsics are text");
         }
         let storage = file_storage::parse(&text).expect("OpenCV's own file is read");
         let calibration = calibration_of(&storage, 1.0).expect("it is whole");

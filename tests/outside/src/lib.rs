@@ -48,6 +48,14 @@ pub fn file(path: &Path) -> Option<PathBuf> {
     found(path.exists(), &path.display().to_string()).then(|| path.to_path_buf())
 }
 
+/// Something else that a machine may lack, such as a running service: true where `is_there` holds.
+///
+/// # Panics
+/// As [`data`].
+pub fn capability(is_there: bool, what: &str) -> bool {
+    found(is_there, what)
+}
+
 /// True where it is there; says or fails where it is not.
 fn found(is_there: bool, what: &str) -> bool {
     let is_required = env::var(REQUIRE).is_ok_and(|value| value == "1");
