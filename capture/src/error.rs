@@ -1,4 +1,4 @@
-//! What can go wrong while capturing, recording and replaying.
+//! Errors of capturing, recording and replaying.
 
 use std::{io::ErrorKind, path::PathBuf};
 
@@ -12,7 +12,7 @@ pub enum CaptureError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: std::io::Error,
     },
     /// There is no room left for a file.
@@ -29,7 +29,7 @@ pub enum CaptureError {
     Format {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong, where, and what to do.
+        /// The problem, its place, and the remedy.
         reason: String,
     },
     /// Another process writes the same subject or recording.
@@ -46,7 +46,7 @@ pub enum CaptureError {
     Frame {
         /// Index of the frame in its source, from 0.
         index: u64,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A device failed.
@@ -54,7 +54,7 @@ pub enum CaptureError {
     Device {
         /// Which device.
         device: String,
-        /// What happened and what to do.
+        /// The problem and the remedy.
         reason: String,
     },
 }

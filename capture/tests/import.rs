@@ -3,9 +3,9 @@
 
 mod common;
 
-use std::{fs, path::Path};
+use std::{ffi::OsStr, fs, os::unix::ffi::OsStrExt, path::Path};
 
-use common::{all_frames, image_folder, shared};
+use common::{all_frames, image_folder};
 use toile_capture::{
     CaptureError, Recorder, RecorderOptions, Replay, Source,
     import::{self, Format, ImportOptions, ImportReport},
@@ -76,7 +76,7 @@ fn bad_folders_get_one_clear_sentence() {
         ("field `width` must be a number", |f| edit(f, "24", "\"24\"")),
         ("24 x 16 pixels, but the calibration is for 48 x 16", |f| edit(f, "24", "48")),
         ("there is no depth image", |f| clear(&f.join("depth"))),
-        ("no known layout", |f| fs::remove_dir_all(f.join("depth")).unwrap()),
+        ("its layout of depth images is not known", |f| fs::remove_dir_all(f.join("depth")).unwrap()),
         ("timestamps.txt: has 2 lines, but there are 3 frames", |f| {
             fs::write(f.join("timestamps.txt"), "1\n2\n").unwrap();
         }),
@@ -293,7 +293,11 @@ fn mixed_names_are_asked_about_and_what_is_not_a_number_is_named() {
     let temp = tempfile::tempdir().unwrap();
     let folder = image_folder(&temp.path().join("take"), 3);
     let one = folder.join("depth/000001.png");
-    let cases = [("12.5.png", "name all images by times or all by numbers"), ("18446744073709551615.png", "12 digits")];
+    let cases = [
+        ("12.5.png", "name all images by times or all by numbers"),
+        ("18446744073709551615.png", "12 digits"),
+        ("18446744073709551616.png", "12 digits"),
+    ];
     for (name, expected) in cases {
         let renamed = folder.join("depth").join(name);
         fs::rename(&one, &renamed).unwrap();
@@ -301,6 +305,11 @@ fn mixed_names_are_asked_about_and_what_is_not_a_number_is_named() {
         assert!(error.contains(expected) && error.contains(name), "{error}");
         fs::rename(&renamed, &one).unwrap();
     }
+    let odd = folder.join("depth").join(OsStr::from_bytes(b"0000\xff1.png"));
+    fs::rename(&one, &odd).unwrap();
+    let error = import::open(&folder, None).err().unwrap().to_string();
+    assert!(error.contains("not valid UTF-8") && error.contains("0000\u{fffd}1.png"), "{error}");
+    fs::rename(&odd, &one).unwrap();
     fs::write(folder.join("timestamps.txt"), "\n").unwrap();
     let error = import::open(&folder, None).err().unwrap().to_string();
     assert!(error.contains("has 0 lines, but there are 3 frames"), "{error}");

@@ -5,7 +5,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{image_folder, record_frames, shared};
+use common::{image_folder, record_frames};
 use toile_capture::{CaptureError, Layer, LockedSubject, Recorder, RecorderOptions, Subject, import, inspect};
 
 fn add(subject: &mut LockedSubject, name: &str, frames: u64) {
@@ -172,7 +172,7 @@ fn broken_subjects_get_one_clear_sentence() {
 }
 
 #[test]
-fn inspection_tells_healthy_from_not() {
+fn inspection_finds_healthy_and_damaged_takes() {
     let temp = tempfile::tempdir().unwrap();
     let folder = image_folder(&temp.path().join("images"), 6);
     let good = inspect(&folder).unwrap();

@@ -87,7 +87,7 @@ fn bare(scan: &Mesh) -> Mesh {
     Mesh { colors: scan.colors.clone(), ..Mesh::new(scan.positions.clone(), scan.triangles.clone()) }
 }
 
-/// What the mesh carries along from the scan.
+/// Values that the mesh carries along from the scan.
 fn channels(
     labels: &Labels,
     on: &Measured,

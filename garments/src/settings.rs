@@ -165,7 +165,7 @@ impl StackSettings {
     }
 }
 
-/// What an export leaves out because clothes hide it.
+/// Triangles that an export leaves out because clothes hide them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CullSettings {

@@ -73,7 +73,7 @@ impl Device {
         }
     }
 
-    /// What a recording lost before it came here (torn or damaged), in words.
+    /// Losses of a recording before it came here (torn or damaged), in words.
     ///
     /// # Errors
     /// [`LiveError`] where it cannot be read at all.

@@ -1,11 +1,11 @@
-//! What can go wrong while a take is recorded; every message is one sentence that says what, where and what to do.
+//! Errors of recording a take; every message is one sentence that names the problem, its place and the remedy.
 
 use toile_capture::CaptureError;
 
 /// Errors of recording.
 #[derive(Debug, thiserror::Error)]
 pub enum LiveError {
-    /// What was asked for makes no sense: a rig file, a device's settings.
+    /// An impossible request: a rig file, a device's settings.
     #[error("{0}")]
     Settings(String),
     /// A device, or the permission to use it.

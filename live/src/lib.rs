@@ -3,7 +3,7 @@
 //! - [`Device`]: what was asked for, opened as a source of frames; [`RigFile`]: several of them in one file;
 //!   [`Color`]: the colour of another camera beside its depth;
 //! - [`record()`]: frames go to the file in the order in which they come; none is dropped here;
-//! - [`Seen`]: what the preview, a thread that fuses what it can keep up with, knows of the turn;
+//! - [`TurnSeen`]: what the preview, a thread that fuses what it can keep up with, knows of the turn;
 //! - [`Status`]: how the take stands, several times a second, for whoever shows it.
 
 mod color;
@@ -20,7 +20,7 @@ mod turn;
 pub use color::Color;
 pub use device::Device;
 pub use error::LiveError;
-pub use preview::Seen;
+pub use preview::TurnSeen;
 pub use record::{Recorded, record};
 pub use rig_file::RigFile;
 pub use status::Status;

@@ -30,7 +30,7 @@ impl Folders {
         self.root.join("build")
     }
 
-    /// What was built from one take, such as `01-trousers`.
+    /// The results built from one take, such as `01-trousers`.
     pub fn layer(&self, layer: &str) -> PathBuf {
         self.build().join(layer)
     }

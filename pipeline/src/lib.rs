@@ -53,4 +53,4 @@ pub use resume::run_step;
 pub use run::Run;
 pub use settings::Settings;
 pub use step::{Product, Remarks, Step};
-pub use summary::{Decided, Measured, Summary, Take};
+pub use summary::{Decided, Measured, Summary, TakeSummary};

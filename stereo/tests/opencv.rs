@@ -3,13 +3,13 @@
 
 use nalgebra::Vector2;
 use serde_json::Value;
-use toile_stereo::{Rectification, View, calibration_of, file_storage, rectify};
+use toile_stereo::{Rectification, RectifiedView, calibration_of, file_storage, rectify};
 
 /// How far a pixel may lie from OpenCV's.
 const TOLERANCE: f64 = 1e-3;
 
 /// Where a pixel of the rectified view comes from.
-fn source(made: &Rectification, view: &View, u: f64, v: f64) -> (f64, f64) {
+fn source(made: &Rectification, view: &RectifiedView, u: f64, v: f64) -> (f64, f64) {
     let c = &made.camera;
     let p = view.source(Vector2::new((u - c.cx) / c.fx, (v - c.cy) / c.fy)).expect("the ray runs forward");
     (p.x, p.y)

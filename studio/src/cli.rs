@@ -21,10 +21,10 @@ Without its own `--json`, a command prints for people; progress and warnings go 
 #[derive(Debug, Parser)]
 #[command(name = "toile", version, after_help = AFTER, arg_required_else_help = true)]
 pub struct Cli {
-    /// What every command takes.
+    /// The options of every command.
     #[command(flatten)]
     pub globals: Globals,
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }

@@ -1,4 +1,4 @@
-//! What can go wrong in the program; every message is one sentence that says what, where and what to do.
+//! Errors of the program; every message is one sentence that names the problem, its place and the remedy.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ impl StudioError {
         Self::Pipeline(PipelineError::io(path, source))
     }
 
-    /// What the program itself refuses at `path`.
+    /// A refusal of the program itself at `path`.
     pub fn refused(path: &Path, reason: impl Into<String>) -> Self {
         Self::Pipeline(PipelineError::refused(path, reason))
     }

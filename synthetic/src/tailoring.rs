@@ -3,10 +3,10 @@
 use nalgebra::{Point3, Vector3};
 use toile_character::Region;
 
-/// What counts as clearly outside or inside a garment's extent, metres.
+/// The distance that counts as clearly outside or inside a garment's extent, metres.
 const FAR: f32 = 0.05;
 
-/// What part of the body a place belongs to, as far as tailoring cares.
+/// The part of the body that a place belongs to, as far as tailoring cares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limb {
     /// Trunk, legs, neck and head.

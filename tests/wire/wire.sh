@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The wire tier: one boot of a small virtual machine, in which simulated devices are behind the kernel's own virtual USB host
 # controller and the unmodified `toile capture` records from them, through libusb and through V4L2. Then clients that we
-# did not write stream from the same devices: the fidelity gate. What it needs is downloaded once into
+# did not write stream from the same devices: the fidelity gate. Its requirements are downloaded once into
 # target/outside/wire/ and kept (rig.sh). Prints a line for each check: WIRE kinect1 PASS 100/100, FIDELITY
 # freenect-camtest PASS, or SKIPPED and why: what the machine lacks, time included, is not a fault, unless
 # TOILE_REQUIRE_OUTSIDE=1 asks for every check.

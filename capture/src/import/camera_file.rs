@@ -14,7 +14,7 @@ use toile_geometry::{Rigid, camera::PinholeCamera};
 use super::{inventory::Listing, rigid::rigid_from_matrix, timed::has_extension};
 use crate::{CaptureError, DeviceIdentity, Rig, Sensor, depth_codec::MAX_PIXELS, files::read_text};
 
-/// What a calibration file says.
+/// The content of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CameraFile {
     pub(super) depth: PinholeCamera,

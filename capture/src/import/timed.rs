@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_times_are_told_from_numbers() {
+    fn names_that_are_times_are_distinguished_from_numbers() {
         assert_eq!(time_of_name("1617685268.377345.png"), Some(1_617_685_268_377_345_000));
         assert_eq!(time_of_name("12.5.jpg"), Some(12_500_000_000));
         assert_eq!(time_of_name("1617685268377.png"), Some(1_617_685_268_377_000_000));

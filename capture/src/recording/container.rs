@@ -50,7 +50,7 @@ enum Packing {
     Zstd(usize),
 }
 
-/// What stands in the file, known from the heads of its records alone.
+/// The content of the file, known from the heads of its records alone.
 #[derive(Debug, Default)]
 pub(super) struct Outline {
     pub(super) chunks: Vec<Chunk>,
@@ -240,7 +240,7 @@ impl Container {
     }
 }
 
-/// What stands before a chunk's records.
+/// The head of a chunk, before its records.
 struct ChunkHead<'a> {
     unpacked: u64,
     crc: u32,

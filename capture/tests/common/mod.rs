@@ -1,7 +1,10 @@
 //! Small synthetic frames and private data for the tests.
 #![allow(dead_code, missing_docs, clippy::unwrap_used)]
 
-use std::sync::Arc;
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use toile_capture::{
     CaptureError, ClockDomain, ColorImage, DepthImage, DeviceIdentity, Frame, Recorder, RecorderOptions, RgbImage, Rig,

@@ -5,7 +5,7 @@
 //! cameras send blocks of their own (`md_capture_timing` of librealsense `src/metadata.h`). Kernels that do not know the
 //! camera leave those out (V4L2_META_FMT_UVC instead of _D4XX).
 
-/// What the camera says about a picture.
+/// The camera's metadata of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Metadata {
     /// Its clock at the picture, microseconds, 32 bits.

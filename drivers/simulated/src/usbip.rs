@@ -105,7 +105,7 @@ impl Urb {
     }
 }
 
-/// What a URB brought.
+/// The data of a URB.
 struct Done {
     status: i32,
     data: Vec<u8>,

@@ -56,7 +56,7 @@ impl Plugged {
     /// Serves until the kernel lets go.
     ///
     /// # Errors
-    /// What serving says.
+    /// The error of serving.
     pub fn wait(self) -> io::Result<()> {
         self.thread.join().map_err(|_| io::Error::other("the server panicked"))?
     }

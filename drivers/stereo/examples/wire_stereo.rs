@@ -32,7 +32,7 @@ use toile_stereo::{DepthFromPair, DepthSettings, Lens, StereoCalibration, read_c
 
 /// The camera waits this long between frames: the matcher takes an emulated processor most of a second.
 const PACE: Duration = Duration::from_secs(1);
-/// So many frames differ.
+/// Number of frames that differ.
 const FRAMES: u64 = 5;
 /// Columns and rows of one view.
 const SIZE: (u32, u32) = scene::SIZE;

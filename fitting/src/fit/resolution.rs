@@ -42,10 +42,10 @@ pub(crate) struct Resolution {
     reverse_cell: f32,
     /// Cell of the body's vertices, metres.
     body_cell: f32,
-    /// Most shape components.
+    /// Maximum number of shape components.
     components: usize,
     turns: Turns,
-    /// Most Gauss–Newton steps.
+    /// Maximum number of Gauss–Newton steps.
     pub iterations: usize,
     gate: Gate,
 }

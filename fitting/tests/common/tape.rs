@@ -1,7 +1,7 @@
 //! Tapes by brute force: another way to the same lengths, for comparison with the library's.
 //!
 //! The length of a taut tape around points of a plane is the integral of their support function over all directions
-//! (Cauchy's formula). Parts of the body are told apart by skin weights, not by the template's regions.
+//! (Cauchy's formula). Parts of the body are distinguished by skin weights, not by the template's regions.
 
 use std::f64::consts::TAU;
 

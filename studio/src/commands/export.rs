@@ -48,7 +48,7 @@ pub struct Export {
     /// BVH motion for the avatar, or `walk` for the one that ships with Toile (without: as the avatar was made last)
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
-    /// What the joints are called in avatar.glb: as VRM names its bones, by H-Anim, or as Mixamo does, which other
+    /// The names of the joints in avatar.glb: as VRM names its bones, by H-Anim, or as Mixamo does, which other
     /// programs map by themselves (without: as the avatar was made last; vrm the first time)
     #[arg(long, value_enum)]
     joint_names: Option<Names>,
@@ -134,10 +134,10 @@ impl Export {
 /// A line for each layer that something was left out of.
 fn left_out(results: &Value) -> String {
     let layers = results["stages"]["avatar/export"]["left_out"].as_object();
-    let line = |(layer, told): (&String, &Value)| {
-        format!("{layer}: {} of {} triangles left out\n", told["triangles"], told["of"])
+    let line = |(layer, reported): (&String, &Value)| {
+        format!("{layer}: {} of {} triangles left out\n", reported["triangles"], reported["of"])
     };
-    layers.into_iter().flatten().filter(|(_, told)| told["triangles"] != 0).map(line).collect()
+    layers.into_iter().flatten().filter(|(_, reported)| reported["triangles"] != 0).map(line).collect()
 }
 
 fn convert(recording: &Path, plain: &Path) -> Result<Answer, StudioError> {

@@ -2,7 +2,7 @@
 
 use toile_fusion::Prior;
 
-/// What is assumed about the motion between frames.
+/// The assumption about the motion between frames.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 pub enum PriorChoice {
     /// The person turns evenly before a resting camera.

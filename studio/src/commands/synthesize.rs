@@ -37,7 +37,7 @@ pub struct Synthesize {
     /// Everything random follows from it
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// What the takes add, inside to outside (at most five; `--garments ""` for the body alone)
+    /// The garments that the takes add, inside to outside (at most five; `--garments ""` for the body alone)
     #[arg(long, value_delimiter = ',', default_value = "trousers,tshirt", value_name = "KINDS")]
     garments: Vec<String>,
     /// Around which mean the person is drawn

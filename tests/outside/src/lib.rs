@@ -1,4 +1,4 @@
-//! What tests need from outside the project: data that may not be given away, and other people's programs.
+//! Requirements of tests from outside the project: data that may not be given away, and other people's programs.
 //!
 //! Where it is missing a test passes, after it has said so on standard error; with `TOILE_REQUIRE_OUTSIDE=1`, which
 //! continuous integration sets where everything is at hand, it fails instead. So a test can never turn green on a machine

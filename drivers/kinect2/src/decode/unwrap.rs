@@ -13,7 +13,7 @@ use super::{
     phasor::LIGHT_PER_LENGTH,
 };
 
-/// Least light of one frequency, and of all three together.
+/// Minimum light of one frequency, and of all three together.
 const MIN_LIGHT: f32 = 3.0;
 const MIN_SUM: f32 = 10.0;
 /// The more light, the better the three must fit: at most e^(a + b · ln light) apart, between two bounds

@@ -52,7 +52,7 @@ pub fn color_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {
     Fault { stream: Stream::Color, frame, packet, what }
 }
 
-/// What frame `number` must give.
+/// The expected content of frame `number`.
 fn truth(number: u64) -> Arc<Truth> {
     let number = number % Pattern::FRAMES;
     let mut all = TRUTH.lock().unwrap();

@@ -18,7 +18,7 @@ const MICROFRAMES: u64 = 8000;
 /// A stream of bulk pictures may be this many pictures before another one.
 const MAX_AHEAD: u64 = 1;
 
-/// What a camera sees, and what its units answer.
+/// The scene before a camera, and the answers of its units.
 pub trait Scene: Send {
     /// The bytes of a picture.
     fn picture(&mut self, picture: Picture) -> Vec<u8>;

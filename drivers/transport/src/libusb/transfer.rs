@@ -63,7 +63,7 @@ struct Pointer(NonNull<libusb_transfer>);
 // SAFETY: *listed*: the pointer is only used under the lock of `Flights`, and libusb's calls are thread-safe.
 unsafe impl Send for Pointer {}
 
-/// What one transfer in flight owns.
+/// Owned by one transfer in flight.
 struct Flight {
     transfer: Transfer,
     shared: Arc<Shared>,

@@ -1,4 +1,4 @@
-//! What the nodes of one simulated video stream share: buffers that wait, and the picture that is being assembled.
+//! The state that the nodes of one simulated video stream share: buffers that wait, and the picture that is being assembled.
 
 use std::collections::VecDeque;
 
@@ -10,7 +10,7 @@ pub(super) const BULK_ROOM: usize = 16_384;
 /// More than any picture has.
 pub(super) const MAX_ROOM: usize = 1 << 26;
 
-/// What the nodes of one stream share.
+/// Shared by the nodes of one stream.
 #[derive(Default)]
 pub(crate) struct Flow {
     pub(super) assembler: Option<Assembler>,
