@@ -25,10 +25,12 @@ pub enum CaptureError {
         path: PathBuf,
     },
     /// A file or folder is not what its format says.
-    #[error("{}: {reason}", printable_path(path))]
+    #[error("{}: {}{reason}", printable_path(path), .field.as_ref().map_or(String::new(), |f| format!("field `{f}` ")))]
     Format {
         /// The file or folder.
         path: PathBuf,
+        /// The field in it, where there is one: `color.fx`.
+        field: Option<String>,
         /// The problem, its place, and the remedy.
         reason: String,
     },
@@ -72,6 +74,11 @@ impl CaptureError {
 
     /// A format error at `path`.
     pub fn format(path: &std::path::Path, reason: impl Into<String>) -> Self {
-        Self::Format { path: path.to_path_buf(), reason: reason.into() }
+        Self::Format { path: path.to_path_buf(), field: None, reason: reason.into() }
+    }
+
+    /// A format error in a field of the file `path`; `reason` goes on after the field's name.
+    pub fn field(path: &std::path::Path, field: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Format { path: path.to_path_buf(), field: Some(field.into()), reason: reason.into() }
     }
 }

@@ -19,7 +19,7 @@ mod turn;
 
 pub use color::Color;
 pub use device::Device;
-pub use error::LiveError;
+pub use error::{DeviceError, LiveError};
 pub use preview::TurnSeen;
 pub use record::{Recorded, record};
 pub use rig_file::RigFile;

@@ -14,7 +14,7 @@ use std::{
 use toile_capture::{CaptureError, Frame, Recorder, RecorderOptions, Source};
 
 use crate::{
-    LiveError,
+    DeviceError, LiveError,
     preview::{Preview, TurnSeen},
     status::{Counter, Status, disk_left},
     stop::{Pace, Stop},
@@ -195,7 +195,7 @@ impl Recording {
             let part = self.recorder.part_path().to_path_buf();
             drop(self.recorder);
             drop(std::fs::remove_file(part));
-            return Err(LiveError::Device(why));
+            return Err(DeviceError::NoFrames(why).into());
         }
         let summary = self.recorder.finish()?;
         let seen = self.preview.finish();

@@ -54,7 +54,7 @@ impl RigFile {
     /// [`LiveError`] names the file and what is wrong with it.
     pub fn read(path: &Path) -> Result<Self, LiveError> {
         let text = std::fs::read_to_string(path).map_err(|e| CaptureError::io(path, e))?;
-        let sensors = parse(&text).map_err(|e| LiveError::Settings(format!("{}: {e}", path.display())))?;
+        let sensors = parse(&text).map_err(|e| LiveError::settings(path, e))?;
         Ok(Self { path: path.to_path_buf(), sensors })
     }
 
@@ -87,7 +87,7 @@ impl RigFile {
             sources.push((source, placed.name.clone(), placed.rig_from_depth));
         }
         let together = Together::new(sources, self.pace());
-        Ok(Box::new(together.map_err(|reason| LiveError::Settings(format!("{}: {reason}", self.path.display())))?))
+        Ok(Box::new(together.map_err(|reason| LiveError::settings(&self.path, reason))?))
     }
 }
 

@@ -165,7 +165,7 @@ impl PipelineError {
     /// The field of that file, where it is known.
     pub fn field_name(&self) -> Option<&str> {
         match self {
-            Self::Format { field, .. } => field.as_deref(),
+            Self::Format { field, .. } | Self::Capture(CaptureError::Format { field, .. }) => field.as_deref(),
             _ => None,
         }
     }

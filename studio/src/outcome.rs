@@ -38,7 +38,7 @@ impl Outcome {
     /// How `answer` counts.
     pub fn of(answer: &Result<Answer, StudioError>) -> Self {
         match answer {
-            Err(StudioError::Usage(_)) => Self::Usage,
+            Err(error) if error.kind() == "usage" => Self::Usage,
             Err(_) => Self::Failed,
             Ok(answer) if !answer.failures.is_empty() => Self::Failed,
             Ok(answer) if !answer.lost.is_empty() => Self::Lost,

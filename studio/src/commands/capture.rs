@@ -166,6 +166,6 @@ fn interrupted() -> Result<Arc<AtomicBool>, StudioError> {
     let pressed = Arc::new(AtomicBool::new(false));
     flag::register_conditional_shutdown(SIGINT, 1, pressed.clone())
         .and_then(|_| flag::register(SIGINT, pressed.clone()))
-        .map_err(|e| StudioError::Device(format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(StudioError::Signal)?;
     Ok(pressed)
 }

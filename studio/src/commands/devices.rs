@@ -18,6 +18,7 @@ use toile_driver_transport::{
 };
 use toile_driver_uvc_depth::nodes::{self, DepthNode};
 use toile_driver_webcam as webcam;
+use toile_live::{DeviceError, LiveError};
 
 use crate::{StudioError, outcome::Answer, session::Session};
 
@@ -52,7 +53,7 @@ fn install() -> Result<Answer, StudioError> {
     let nodes = KernelVideo::default().list().unwrap_or_default();
     let vendors: Vec<u16> = nodes.into_iter().filter_map(|node| Some(node.usb?.id.0)).collect();
     let path =
-        udev::install(Path::new(udev::RULES_FOLDER), &vendors).map_err(|e| StudioError::Device(e.to_string()))?;
+        udev::install(Path::new(udev::RULES_FOLDER), &vendors).map_err(|e| LiveError::from(DeviceError::from(e)))?;
     let text = format!(
         "{}\nRun `udevadm control --reload` (as root), then plug the cameras in again.\n",
         printable_path(&path)
