@@ -112,7 +112,7 @@ fn frames_that_make_no_surface_are_an_error_and_no_empty_scan() {
     assert!(error.to_string().contains("no surface"), "{error}");
 }
 
-/// What is far must not fall between samples whose spacing suits what is near.
+/// Far surfaces must not fall between samples whose spacing suits near ones.
 #[test]
 fn a_far_wall_beside_much_that_is_near_has_no_gaps() {
     let camera = PinholeCamera::ideal(240, 180, 150.0, 150.0, 119.5, 89.5);

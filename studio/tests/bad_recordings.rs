@@ -44,6 +44,8 @@ fn a_wrong_camera_field_is_named() {
         let answer = exits(1, toile().args(recording.import("body")));
         let message = answer["error"]["message"].as_str().unwrap();
         assert!(message.contains("camera.json") && message.contains(field), "{field} = {value}: {message}");
+        assert_eq!(answer["error"]["field"], field, "{answer}");
+        assert!(answer["error"]["file"].as_str().unwrap().ends_with("camera.json"), "{answer}");
         assert!(recording.nothing_was_written(), "{field} = {value}");
     }
 }

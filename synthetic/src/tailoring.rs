@@ -75,7 +75,7 @@ pub struct Tailoring {
     pub(crate) ends: Vec<Plane>,
     /// Around the neck, for tops.
     pub(crate) neckline: Option<Neckline>,
-    /// What a scarf stays within: the middle of the neck's root and a distance from it.
+    /// The limits of a scarf: the middle of the neck's root and a distance from it.
     pub(crate) within: Option<(Point3<f32>, f32)>,
     /// Where the legs end (left and right), if the garment has legs.
     pub(crate) legs: Option<[Plane; 2]>,

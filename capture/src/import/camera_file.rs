@@ -11,7 +11,10 @@ use nalgebra::Matrix4;
 use serde_json::{Map, Value};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
-use super::{inventory::Listing, rigid::rigid_from_matrix, timed::has_extension};
+use super::{
+    inventory::{Listing, has_extension},
+    rigid::rigid_from_matrix,
+};
 use crate::{CaptureError, DeviceIdentity, Rig, Sensor, depth_codec::MAX_PIXELS, files::read_text};
 
 /// The content of a calibration file.

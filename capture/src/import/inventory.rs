@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use super::{images, timed::has_extension};
+use super::images;
 use crate::{CaptureError, Frame, Rig, Source};
 
 /// Nominal rate where a folder does not say one (the common one of Kinect-class sensors).
@@ -73,6 +73,11 @@ impl Listing {
 
 fn is_of_the_system(name: &str) -> bool {
     name.starts_with('.') || ["thumbs.db", "desktop.ini"].contains(&name.to_ascii_lowercase().as_str())
+}
+
+/// True where a file's name ends in one of these extensions.
+pub(super) fn has_extension(name: &str, extensions: &[&str]) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, extension)| extensions.contains(&extension.to_ascii_lowercase().as_str()))
 }
 
 /// The last run of digits in a file's stem: its frame number. One beyond 64 bits gives [`u64::MAX`], which

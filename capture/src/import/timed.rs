@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::inventory::{Entry, Listing};
+use super::inventory::{Entry, Listing, has_extension};
 use crate::{CaptureError, associate::associate, trajectory::parse_seconds};
 
 /// Depth and colour further apart than this do not belong together (the TUM benchmark's own default).
@@ -59,11 +59,6 @@ pub(super) fn named_by_time(
             Err(CaptureError::format(&list[0].path, reason))
         }
     }
-}
-
-/// True where a file's name ends in one of these extensions.
-pub(super) fn has_extension(name: &str, extensions: &[&str]) -> bool {
-    name.rsplit_once('.').is_some_and(|(_, extension)| extensions.contains(&extension.to_ascii_lowercase().as_str()))
 }
 
 /// The time that a file's name is, nanoseconds: seconds with a fraction (`1617685268.377345.png`), or a Unix time in

@@ -274,7 +274,7 @@ fn add_loose(chunks: &mut Vec<Chunk>, at: u64, length: u64) {
     }
 }
 
-/// What follows the name in a metadata record, where the name is `name`.
+/// The content after the name in a metadata record, where the name is `name`.
 fn named_content(bytes: &[u8], name: &str) -> Option<Vec<u8>> {
     let mut cursor = Cursor(bytes);
     (cursor.string()? == name).then(|| cursor.0.to_vec())

@@ -17,7 +17,7 @@ use crate::vhci::Plugged;
 const PATIENCE: Duration = Duration::from_mins(1);
 /// How often a condition is looked at.
 const LOOK: Duration = Duration::from_millis(20);
-/// What the first frame may take, and how often that is tried: other work of the machine must not decide.
+/// The time limit of the first frame, and how often that is tried: other work of the machine must not decide.
 const FIRST_LIMIT: Duration = Duration::from_secs(1);
 const FIRST_TRIES: u32 = 5;
 /// Frames of a cycle before the unplugging.
@@ -50,7 +50,7 @@ pub trait Bench {
     /// The driver's answer.
     fn open(&mut self) -> Result<Box<dyn Source>, String>;
 
-    /// What the model sent as this frame, where every pixel is the same.
+    /// The picture that the model sent as this frame, where every pixel is the same.
     ///
     /// # Errors
     /// How it differs.

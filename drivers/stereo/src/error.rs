@@ -48,7 +48,7 @@ pub enum StereoDriverError {
     Recorded {
         /// The folder or file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// The problem and the remedy.
         reason: String,
     },
     /// Reading a recording failed.

@@ -4,7 +4,7 @@ use std::{io, path::Path, time::Duration};
 
 use crate::{DeviceInfo, udev::advice};
 
-/// What Linux says of a node whose device was unplugged.
+/// The error of Linux for a node whose device was unplugged.
 const ENODEV: i32 = 19;
 
 /// Errors of the transport crate.

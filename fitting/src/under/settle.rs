@@ -73,7 +73,7 @@ pub fn settle_under(
     Ok(SettledBody { pose: turned, mesh, report })
 }
 
-/// What was moved from `posed` to `points`, and what still lies outside.
+/// The moves from `posed` to `points`, and the vertices that still lie outside.
 fn report(
     model: &BodyModel,
     inside: &Inside,

@@ -34,13 +34,13 @@ impl BruteForce<'_> {
         joints.filter(|(j, _)| Joint::from_index(usize::from(*j)).is_some_and(&of)).map(|(_, w)| w).sum()
     }
 
-    /// What moves less with the arms and the head than with the rest.
+    /// The part that moves less with the arms and the head than with the rest.
     pub fn without_arms(&self) -> Keep {
         let is_arm = |j: Joint| is_in(j, Joint::LeftUpperArm) || is_in(j, Joint::RightUpperArm);
         (0..self.model.vertex_count()).map(|v| self.share(v, is_arm) < 0.5).collect()
     }
 
-    /// What moves more with one leg than with the other.
+    /// The part that moves more with one leg than with the other.
     pub fn leg(&self, side: &str) -> Keep {
         let (own, other) = match side {
             "left" => (Joint::LeftUpperLeg, Joint::RightUpperLeg),
@@ -50,7 +50,7 @@ impl BruteForce<'_> {
         (0..self.model.vertex_count()).map(more).collect()
     }
 
-    /// What moves mostly with one arm.
+    /// The part that moves mostly with one arm.
     pub fn arm(&self, side: &str) -> Keep {
         let upper = if side == "left" { Joint::LeftUpperArm } else { Joint::RightUpperArm };
         (0..self.model.vertex_count()).map(|v| self.share(v, |j| is_in(j, upper)) >= 0.5).collect()

@@ -212,7 +212,7 @@ impl<'a, L: Lanes> Layers<'a, L> {
         LANES
     }
 
-    /// What lies outside the image is seen on its border, which is empty. From a guess, two of Newton's steps are exact to
+    /// Points outside the image are seen on its border, which is empty. From a guess, two of Newton's steps are exact to
     /// the fourth power of half a block's share of the depth: a thirtieth of a pixel at worst.
     #[inline(always)]
     fn look_up(&self, [x, y, z]: &Points<L>, guess: Option<L::F>, offset: L::F) -> LookUp<L> {

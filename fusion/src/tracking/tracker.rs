@@ -27,7 +27,7 @@ const CANDIDATE: f64 = 1.5;
 /// A prediction is only believed when the model holds more frames than this.
 const SETTLED: usize = 4;
 
-/// What is known since the subject was last where it was expected.
+/// The state since the subject was last where it was expected.
 #[derive(Debug, Clone, Default)]
 struct Lost {
     /// Frames in a row without a trusted pose.

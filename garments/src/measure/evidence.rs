@@ -11,7 +11,7 @@ const SLIP_SHARE: f32 = 0.2;
 const SLIPS: f32 = 0.03;
 /// Scale of the exponential heights of new cloth over the surface below, metres: near hems it is low, skirts reach far.
 const CLOTH_HEIGHT: f32 = 0.06;
-/// What the density of cloth heights is divided by, metres: most cloth lies within this.
+/// Divisor of the density of cloth heights, metres: most cloth lies within this.
 const CLOTH_SPREAD: f32 = 0.017;
 /// How far new cloth presses in the surface below, metres.
 const CLOTH_PRESS: f32 = 0.002;

@@ -43,7 +43,7 @@ impl Demo {
     /// Runs the command.
     ///
     /// # Errors
-    /// [`StudioError`] where no session is found or it cannot be copied; what processing says.
+    /// [`StudioError`] where no session is found or it cannot be copied; the error of processing.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         let recorded = self.recorded.clone().or_else(find_recorded).ok_or_else(|| {
             StudioError::Usage("the folder recorded/ was not found above the current folder or the program; give it with --recorded DIR".into())

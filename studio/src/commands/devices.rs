@@ -1,4 +1,4 @@
-//! `toile devices`: what is plugged in, at which speed, and what is wrong with it.
+//! `toile devices`: the cameras that are plugged in, their speed, and their problems.
 
 use std::{
     collections::BTreeSet,
@@ -30,7 +30,7 @@ Examples:
   toile devices
   sudo toile devices --install-udev-rules";
 
-/// List which cameras are plugged in, at which speed, and what is wrong with them
+/// List the cameras that are plugged in, their speed, and their problems
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Devices {

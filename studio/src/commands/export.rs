@@ -24,13 +24,13 @@ use crate::{
 
 const AFTER: &str = "\
 A subject's avatar.glb (pose of the first scan, with the motion as a clip) and avatar.vrm (T-pose) are written into its
-folder; what is missing before is run. A recording can be converted so that other viewers of MCAP show its depth.
+folder; missing steps before it are run. A recording can be converted so that other viewers of MCAP show its depth.
 
 With --cull-hidden both files lack what no one can see under closed cloth: body and lower layers end --cull-margin
 inside of each hem, collar and cuff. Head, hands and feet stay, and what only loose or open cloth covers. The files are
 smaller, and nothing can poke through where nothing is; export again without it for whole layers.
 
-Motion, joint names and what is left out are remembered in SUBJECT/edits/: later runs make the same avatar.
+Motion, joint names and hidden triangles that are left out are remembered in SUBJECT/edits/: later runs make the same avatar.
 
 Examples:
   toile export anna --motion dance.bvh

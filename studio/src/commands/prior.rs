@@ -1,4 +1,4 @@
-//! `--prior`: what is assumed about the motion between frames.
+//! `--prior`: the assumption about the motion between frames.
 
 use toile_fusion::Prior;
 

@@ -61,7 +61,7 @@ pub struct Synthesize {
     /// How far the chest moves with the breath, millimetres
     #[arg(long, default_value_t = 0.0)]
     breathing: f64,
-    /// Camera to axis, metres (default: what suits the camera)
+    /// Camera to axis, metres (default: the distance that suits the camera)
     #[arg(long)]
     distance: Option<f64>,
     /// Depth as the geometry is, without the sensor's noise

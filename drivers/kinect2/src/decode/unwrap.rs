@@ -24,7 +24,7 @@ const MISFIT: [f32; 2] = [0.349_065_9, 0.610_865_3];
 /// Direction in which the three answers lie when they agree: (80, 16, 120) MHz of length one.
 const AGREE: [f32; 3] = [0.551_318, 0.110_264, 0.826_977];
 
-/// What a row's phasors say.
+/// The distances of a row's phasors.
 pub struct Distances<'a> {
     /// Distance along the ray in units of 2083.333 mm; 0 where there is none.
     pub range: &'a mut Row<f32>,

@@ -17,7 +17,7 @@ use toile_driver_transport::{DeviceInfo, simulated::SimulatedBus};
 /// One pattern for all tests, computed once.
 pub static PATTERN: LazyLock<Pattern> = LazyLock::new(Pattern::default);
 
-/// What each frame of the pattern must give: millimetres, and the decoded (mirrored) colours.
+/// The expected content of each frame of the pattern: millimetres, and the decoded (mirrored) colours.
 type Truth = (Vec<u16>, Vec<[u8; 3]>);
 static TRUTH: LazyLock<Mutex<BTreeMap<u64, Arc<Truth>>>> = LazyLock::new(Mutex::default);
 

@@ -41,7 +41,7 @@ impl Pattern {
         Self { optics, ..Self::default() }
     }
 
-    /// What depth pixel (`u`, `v`) sees in frame `frame`: waves with steps in them, dark and far places.
+    /// The scene at depth pixel (`u`, `v`) in frame `frame`: waves with steps in them, dark and far places.
     pub fn seen(frame: u64, u: usize, v: usize) -> Lit {
         let (x, y, t) = (u as f64, v as f64, (frame % Self::FRAMES) as f64);
         let wave = 1.8 + 0.4 * (x / 61.0 + t).sin() + 0.3 * (y / 43.0).cos();

@@ -23,7 +23,7 @@ pub trait Scene: Send {
     /// The bytes of a picture.
     fn picture(&mut self, picture: Picture) -> Vec<u8>;
 
-    /// What the header of a picture's first payload has behind the standard part.
+    /// The part of the header of a picture's first payload behind the standard one.
     fn extra_header(&mut self, picture: Picture) -> Vec<u8> {
         let _ = picture;
         Vec::new()

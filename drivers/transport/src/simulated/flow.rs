@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use super::uvc::Assembler;
 use crate::video::VideoBuffer;
 
-/// What one bulk read asks for (`UVC_MAX_PACKETS` of 512 bytes).
+/// The size of one bulk read (`UVC_MAX_PACKETS` of 512 bytes).
 pub(super) const BULK_ROOM: usize = 16_384;
 /// More than any picture has.
 pub(super) const MAX_ROOM: usize = 1 << 26;

@@ -95,7 +95,7 @@ impl<S: Streams> Streaming<S> {
     /// The next frame; `None` at the end.
     ///
     /// # Errors
-    /// What [`Streams::pop`] reports of one frame; after the last frame, once, what ended the streams.
+    /// The report of [`Streams::pop`] for one frame; after the last frame, once, what ended the streams.
     pub fn next_frame(&mut self) -> Result<Option<S::Frame>, S::Error> {
         loop {
             if let Some(frame) = self.streams.pop() {

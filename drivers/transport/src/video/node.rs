@@ -36,7 +36,7 @@ pub struct NodeInfo {
     pub usb: Option<UsbPlace>,
 }
 
-/// What the driver filled. Buffers of which it knows that bytes are missing are kept from callers; their numbers are
+/// The buffers that the driver filled. Those of which it knows that bytes are missing are kept from callers; their numbers are
 /// missing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VideoBuffer {
