@@ -9,7 +9,7 @@ PREFIX ?= $(HOME)/.local
 help: ## List the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
 
-setup: ## Install what is missing: a C compiler and Rust
+setup: ## Install a C compiler and Rust where they are missing
 	@bash scripts/setup.sh
 
 build: setup ## Build the program

@@ -1,18 +1,25 @@
 #!/usr/bin/env bash
-# Outside programs that the tests ask about our files. Each is optional: a test whose program is missing says "skipped".
+# Outside programs that the tests ask about our files. Each is optional: a test whose program is missing says so and passes.
+# With TOILE_REQUIRE_OUTSIDE=1 the test fails instead, and so does this script.
 #   target/outside/node_modules/gltf-validator   Khronos' glTF validator (npm)
 #   assimp                                       loads GLB (Debian's assimp-utils)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 mkdir -p target/outside
+status=0
+
+missing() { # program, why
+    echo "outside: $1 is missing: $2"
+    if [ "${TOILE_REQUIRE_OUTSIDE:-}" = 1 ]; then status=1; fi
+}
 
 if [ ! -d target/outside/node_modules/gltf-validator ]; then
     if command -v npm >/dev/null; then
         echo "outside: installing gltf-validator"
         (cd target/outside && timeout 180 npm install --no-audit --no-fund --silent gltf-validator@2.0.0-dev.3.10 >npm.log 2>&1) ||
-            echo "outside: skipped gltf-validator: npm could not install it (target/outside/npm.log)"
+            missing gltf-validator "npm could not install it (target/outside/npm.log)"
     else
-        echo "outside: skipped gltf-validator: there is no npm"
+        missing gltf-validator "it is installed with npm, which is missing too"
     fi
 fi
 
@@ -20,9 +27,9 @@ if ! command -v assimp >/dev/null; then
     if [ "$(id -u)" -eq 0 ] && command -v apt-get >/dev/null; then
         echo "outside: installing assimp"
         { timeout 120 apt-get update -q && timeout 180 apt-get install -y -q --no-install-recommends assimp-utils; } >target/outside/apt.log 2>&1 ||
-            echo "outside: skipped assimp: apt-get could not install it (target/outside/apt.log)"
+            missing assimp "apt-get could not install it (target/outside/apt.log)"
     else
-        echo "outside: skipped assimp: not installed, and only root can install it"
+        missing assimp "only root can install it"
     fi
 fi
-exit 0
+exit "$status"

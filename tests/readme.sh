@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs every block of README.md that is marked `sh`, from top to bottom in one shell, as somebody does who pastes the page.
+# Runs every block of README.md that is marked `sh`, but for its `git clone`, from top to bottom in one shell, as somebody
+# does who pastes the page.
 # The program is installed below a home folder of its own, and the folder trial/ that the page makes is removed again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -9,7 +10,8 @@ home=$(mktemp -d)
 trap 'rm -rf "$home" "$top/trial"' EXIT
 export CARGO_HOME=${CARGO_HOME:-$HOME/.cargo} RUSTUP_HOME=${RUSTUP_HOME:-$HOME/.rustup} HOME=$home
 
-awk '/^```sh$/ { inside = 1; next } /^```$/ { inside = 0 } inside' README.md >"$home/page.sh"
+# The clone stands here already: its line is left out.
+awk '/^```sh$/ { inside = 1; next } /^```$/ { inside = 0 } inside && !/^git clone /' README.md >"$home/page.sh"
 grep -q 'toile process anna' "$home/page.sh" || { echo "README: no blocks found" >&2; exit 1; }
 if ! bash -e "$home/page.sh" >"$home/page.log" 2>&1; then
     tail -n 30 "$home/page.log" >&2

@@ -57,7 +57,7 @@ def score(args, script, *files):
 
 
 def row(subject, what, value, unit="mm", bar=None, least=False):
-    """One line of the table; `bar` is the most (or the least) that is allowed."""
+    """One line of the table; `bar` is the limit, from above (or from below where `least` is set)."""
     if value is None:
         ROWS.append((subject, what, "-", bar_text(bar, unit, least), False if bar is not None else None))
         return

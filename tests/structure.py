@@ -29,7 +29,14 @@ DUPLICATE_LINES = 8
 INNER_LOOPS = [
     ("fusion", "push", "update_row"),
     ("fusion", "push", "accumulate"),
+    ("fusion", "fuse", "update_row"),
+    ("fusion", "fuse", "accumulate"),
+    ("fusion", "finish", "update_row"),
+    ("fusion", "finish", "match_pixel"),
     ("fitting", "fit_body", "accumulate"),
+    ("fitting", "pose_under", "accumulate"),
+    ("garments", "extract", "compare"),
+    ("garments", "extract", "edge_costs"),
     ("garments", "stack", "displacement"),
     ("stereo", "match_pair", "aggregate_row"),
 ]

@@ -6,13 +6,13 @@
 
 mod calibration_pose;
 mod constants;
+mod flat_foot;
 mod ground;
 mod looping;
 mod moments;
 mod placement;
 mod reference;
 mod resample;
-mod stance;
 mod turns;
 
 use serde::{Deserialize, Serialize};
@@ -80,7 +80,7 @@ pub struct RetargetReport {
     pub poses: usize,
     /// Depth of the lower foot's sole below the floor, 98th percentile over the poses, metres.
     pub foot_below_floor: f64,
-    /// What was wrong with the motion file and could be put right, a sentence each.
+    /// Problems of the motion file that could be put right, a sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }

@@ -191,7 +191,7 @@ fn h_anim(part: &str) -> &str {
 
 /// Joint frames turned arbitrarily, so that the zero pose is a heap of bones as in Bandai Namco's files.
 #[test]
-fn a_zero_pose_that_is_no_pose_is_seen_through() {
+fn a_zero_pose_that_is_not_a_pose_is_recognised() {
     let walk = shipped_walk().unwrap();
     let own: Vec<UnitQuaternion<f64>> = (0..walk.joints.len())
         .map(|i| UnitQuaternion::from_euler_angles(1.3 * i as f64, 0.9 + i as f64, 2.1 * i as f64))
@@ -311,8 +311,8 @@ fn limbs_of_real_captures_point_where_the_source_points() {
         }
         let up = Vector3::from(result.report.up);
         assert!((subject_from_source * up).y > 0.9999, "{}: up became {}", file.display(), subject_from_source * up);
-        let facing = result.motion.poses[0].rotation(Joint::Hips) * Vector3::z();
-        assert!(facing.x.abs() < 1e-6 && facing.z > 0.0, "{}: faces {facing}", file.display());
+        let forward = result.motion.poses[0].rotation(Joint::Hips) * Vector3::z();
+        assert!(forward.x.abs() < 1e-6 && forward.z > 0.0, "{}: faces {forward}", file.display());
     }
 }
 

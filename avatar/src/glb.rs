@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use crate::{Avatar, AvatarError, buffer::Buffer, clip::clip, layer_mesh, rig::Rig};
 
-/// What wrote the file, for `asset.generator`.
+/// The program that wrote the file, for `asset.generator`.
 const GENERATOR: &str = concat!("Toile ", env!("CARGO_PKG_VERSION"));
 
 /// The avatar as a GLB file.
@@ -14,7 +14,7 @@ const GENERATOR: &str = concat!("Toile ", env!("CARGO_PKG_VERSION"));
 /// same bytes. A single layer makes a rigged scan.
 ///
 /// # Errors
-/// What [`Avatar::validate`] finds.
+/// The error of [`Avatar::validate`].
 pub fn write_glb(avatar: &Avatar) -> Result<Vec<u8>, AvatarError> {
     avatar.validate()?;
     let rig = Rig::posed(&avatar.skeleton, &avatar.pose0);

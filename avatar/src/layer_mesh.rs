@@ -51,7 +51,7 @@ pub(crate) fn material(layer: &AvatarLayer) -> Value {
     })
 }
 
-/// What importers cannot know: order of dressing, type of garment, thickness, how much of it hangs free.
+/// Facts that importers cannot know: order of dressing, type of garment, thickness, how much of it hangs free.
 pub(crate) fn extras(layer: &AvatarLayer) -> Value {
     let mut extras = json!({ "layer": layer.order });
     if let Some(garment) = &layer.garment {

@@ -14,7 +14,7 @@
 //! let mut weights = SkinWeights::default();
 //! corners.iter().for_each(|_| weights.push(&[(0, 1.0)]));
 //! let avatar = Avatar {
-//!     name: "alder".into(),
+//!     name: "anna".into(),
 //!     skeleton: Skeleton { rest: [Point3::new(0.0, 1.0, 0.0); JOINT_COUNT] },
 //!     joint_names: JointNaming::Vrm,
 //!     pose0: Pose::identity(),

@@ -131,7 +131,7 @@ fn every_layer_is_a_mesh_node_of_its_name_on_one_skin() {
 }
 
 #[test]
-fn what_hangs_free_is_told_by_vertex_and_as_a_share() {
+fn free_parts_are_written_by_vertex_and_as_a_share() {
     let mut avatar = dressed();
     let mesh = &mut avatar.layers[1].mesh;
     let free: Vec<f32> = (0..mesh.positions.len()).map(|v| f32::from(u8::from(v % 4 == 0))).collect();

@@ -109,7 +109,7 @@ fn has_sound_markers(bytes: &[u8]) -> bool {
     false
 }
 
-/// What follows the bits of a scan: the first marker that is not part of them; nothing where there is none.
+/// The bytes after the bits of a scan: the first marker that is not part of them; nothing where there is none.
 fn behind_scan(bytes: &[u8], has_restarts: bool) -> &[u8] {
     let mut rest = bytes;
     while let Some(at) = rest.iter().position(|byte| *byte == 0xff) {

@@ -1,4 +1,4 @@
-//! What can go wrong while capturing, recording and replaying.
+//! Errors of capturing, recording and replaying.
 
 use std::{io::ErrorKind, path::PathBuf};
 
@@ -12,7 +12,7 @@ pub enum CaptureError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: std::io::Error,
     },
     /// There is no room left for a file.
@@ -25,11 +25,13 @@ pub enum CaptureError {
         path: PathBuf,
     },
     /// A file or folder is not what its format says.
-    #[error("{}: {reason}", printable_path(path))]
+    #[error("{}: {}{reason}", printable_path(path), .field.as_ref().map_or(String::new(), |f| format!("field `{f}` ")))]
     Format {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong, where, and what to do.
+        /// The field in it, where there is one: `color.fx`.
+        field: Option<String>,
+        /// The problem, its place, and the remedy.
         reason: String,
     },
     /// Another process writes the same subject or recording.
@@ -46,7 +48,7 @@ pub enum CaptureError {
     Frame {
         /// Index of the frame in its source, from 0.
         index: u64,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A device failed.
@@ -54,7 +56,7 @@ pub enum CaptureError {
     Device {
         /// Which device.
         device: String,
-        /// What happened and what to do.
+        /// The problem and the remedy.
         reason: String,
     },
 }
@@ -72,6 +74,11 @@ impl CaptureError {
 
     /// A format error at `path`.
     pub fn format(path: &std::path::Path, reason: impl Into<String>) -> Self {
-        Self::Format { path: path.to_path_buf(), reason: reason.into() }
+        Self::Format { path: path.to_path_buf(), field: None, reason: reason.into() }
+    }
+
+    /// A format error in a field of the file `path`; `reason` goes on after the field's name.
+    pub fn field(path: &std::path::Path, field: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Format { path: path.to_path_buf(), field: Some(field.into()), reason: reason.into() }
     }
 }

@@ -18,7 +18,7 @@ pub enum ColorImage {
     Rgb(Arc<RgbImage>),
 }
 
-/// What one sensor saw at one time. Cheap to clone.
+/// The images of one sensor at one time. Cheap to clone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     /// Which sensor of the rig, by index.
@@ -56,7 +56,7 @@ impl ColorImage {
     /// Decodes the whole image to see whether it is whole; gives its columns and rows.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The problem.
     pub(crate) fn check(&self) -> Result<(u32, u32), String> {
         let image = match self {
             Self::Rgb(image) => return Ok((image.width, image.height)),

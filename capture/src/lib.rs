@@ -5,11 +5,11 @@
 //! - [`ClockDomain`], [`ClockFit`]: which clock stamps frames, and its fit to the host's;
 //! - [`TickClock`]: a device's ticks, which wrap, as a time that does not;
 //! - [`pairing`]: depth and colour of one time made one frame, for devices that send them apart;
-//! - [`pixels`]: what cameras send to images: depth, grey, YUYV, JPEG markers;
-//! - [`Source`]: what live devices, replay and the synthetic sensor have in common;
+//! - [`pixels`]: the bytes of cameras to images: depth, grey, YUYV, JPEG markers;
+//! - [`Source`]: the trait that live devices, replay and the synthetic sensor have in common;
 //! - [`Recorder`] writes frames to an MCAP file, [`Replay`] is the file as a source; [`depth_codec`] packs depth;
 //! - [`import`](mod@import) reads other people's folders; [`Subject`] is a person's folder with its takes,
-//!   [`LockedSubject`] the same for the one process that may write it; [`inspect`](mod@inspect) says what is in any of
+//!   [`LockedSubject`] the same for the one process that may write it; [`inspect`](mod@inspect) lists the contents of any of
 //!   them and whether it is healthy;
 //! - [`trajectory`]: poses over time as text; [`files`]: files that appear whole or not at all.
 //!

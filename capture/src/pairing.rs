@@ -51,7 +51,7 @@ impl<D, C> Pairing<D, C> {
         self.meet(MAX_WAITING);
     }
 
-    /// What waits for a partner goes on alone: no more will come.
+    /// Pictures that wait for a partner go on alone: no more will come.
     pub fn finish(&mut self) {
         self.meet(0);
     }

@@ -1,4 +1,4 @@
-//! What live devices, replay and the synthetic sensor have in common.
+//! The trait that live devices, replay and the synthetic sensor have in common.
 
 use crate::{CaptureError, Frame, Rig};
 

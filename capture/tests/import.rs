@@ -3,9 +3,9 @@
 
 mod common;
 
-use std::{fs, path::Path};
+use std::{ffi::OsStr, fs, os::unix::ffi::OsStrExt, path::Path};
 
-use common::{all_frames, image_folder, shared};
+use common::{all_frames, image_folder};
 use toile_capture::{
     CaptureError, Recorder, RecorderOptions, Replay, Source,
     import::{self, Format, ImportOptions, ImportReport},
@@ -76,7 +76,7 @@ fn bad_folders_get_one_clear_sentence() {
         ("field `width` must be a number", |f| edit(f, "24", "\"24\"")),
         ("24 x 16 pixels, but the calibration is for 48 x 16", |f| edit(f, "24", "48")),
         ("there is no depth image", |f| clear(&f.join("depth"))),
-        ("no known layout", |f| fs::remove_dir_all(f.join("depth")).unwrap()),
+        ("its layout of depth images is not known", |f| fs::remove_dir_all(f.join("depth")).unwrap()),
         ("timestamps.txt: has 2 lines, but there are 3 frames", |f| {
             fs::write(f.join("timestamps.txt"), "1\n2\n").unwrap();
         }),
@@ -144,7 +144,7 @@ fn real_folders_are_guessed_and_read() {
         real("turntable/noisy", Format::ToileFolder, 300, (640, 480), false, 300),
     ];
     for case in cases {
-        let Some(path) = shared(case.path) else { continue };
+        let Some(path) = toile_outside::data(case.path) else { continue };
         assert_eq!(import::guess(&path).unwrap(), case.format, "{}", case.path);
         let mut source = import::open(&path, None).unwrap();
         assert_eq!(source.frame_count(), Some(case.frames), "{}", case.path);
@@ -175,7 +175,7 @@ fn real_folders_are_guessed_and_read() {
 #[test]
 fn reference_poses_carry_the_frames_device_times() {
     for name in ["subjects/birch/00-body", "real/rgbd/uva_cv2_person_turn", "turntable/clean"] {
-        let Some(path) = shared(name) else { continue };
+        let Some(path) = toile_outside::data(name) else { continue };
         let poses = import::reference_poses(&path).unwrap().unwrap();
         let frames = all_frames(import::open(&path, None).unwrap().as_mut()).unwrap();
         for (pose, frame) in poses.iter().zip(&frames) {
@@ -186,7 +186,7 @@ fn reference_poses_carry_the_frames_device_times() {
 
 #[test]
 fn a_real_take_survives_recording_bit_by_bit() {
-    let Some(path) = shared("subjects/alder/00-body") else { return };
+    let Some(path) = toile_outside::data("subjects/alder/00-body") else { return };
     let temp = tempfile::tempdir().unwrap();
     let out = temp.path().join("00-body.mcap");
     let report = import_to(&path, &out).unwrap();
@@ -200,7 +200,7 @@ fn a_real_take_survives_recording_bit_by_bit() {
 
 #[test]
 fn masks_of_uva_cut_the_background_only_when_asked() {
-    let Some(path) = shared("real/rgbd/uva_cv2_person_turn") else { return };
+    let Some(path) = toile_outside::data("real/rgbd/uva_cv2_person_turn") else { return };
     let count = |apply_mask| {
         let mut source = import::open_with(&path, &ImportOptions { format: None, apply_mask }).unwrap();
         let depth = source.next_frame().unwrap().unwrap().depth.unwrap();
@@ -212,7 +212,7 @@ fn masks_of_uva_cut_the_background_only_when_asked() {
 
 #[test]
 fn the_turntable_folder_itself_points_to_its_parts() {
-    let Some(path) = shared("turntable") else { return };
+    let Some(path) = toile_outside::data("turntable") else { return };
     let error = import::open(&path, None).err().unwrap().to_string();
     assert!(error.contains("clean, noisy"), "{error}");
 }
@@ -293,7 +293,11 @@ fn mixed_names_are_asked_about_and_what_is_not_a_number_is_named() {
     let temp = tempfile::tempdir().unwrap();
     let folder = image_folder(&temp.path().join("take"), 3);
     let one = folder.join("depth/000001.png");
-    let cases = [("12.5.png", "name all images by times or all by numbers"), ("18446744073709551615.png", "12 digits")];
+    let cases = [
+        ("12.5.png", "name all images by times or all by numbers"),
+        ("18446744073709551615.png", "12 digits"),
+        ("18446744073709551616.png", "12 digits"),
+    ];
     for (name, expected) in cases {
         let renamed = folder.join("depth").join(name);
         fs::rename(&one, &renamed).unwrap();
@@ -301,6 +305,11 @@ fn mixed_names_are_asked_about_and_what_is_not_a_number_is_named() {
         assert!(error.contains(expected) && error.contains(name), "{error}");
         fs::rename(&renamed, &one).unwrap();
     }
+    let odd = folder.join("depth").join(OsStr::from_bytes(b"0000\xff1.png"));
+    fs::rename(&one, &odd).unwrap();
+    let error = import::open(&folder, None).err().unwrap().to_string();
+    assert!(error.contains("not valid UTF-8") && error.contains("0000\u{fffd}1.png"), "{error}");
+    fs::rename(&odd, &one).unwrap();
     fs::write(folder.join("timestamps.txt"), "\n").unwrap();
     let error = import::open(&folder, None).err().unwrap().to_string();
     assert!(error.contains("has 0 lines, but there are 3 frames"), "{error}");

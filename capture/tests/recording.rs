@@ -132,7 +132,7 @@ fn flipped_bytes_never_panic_or_lie() {
             Ok((_, _, true)) | Err(_) => noticed += 1,
         }
     }
-    // What is read is everything up to the end of the data; the summary behind it only helps other programs.
+    // Everything is read up to the end of the data; the summary behind it only helps other programs.
     assert!(noticed > silent && silent > 0, "{noticed} were noticed, {silent} had no effect");
 }
 

@@ -5,7 +5,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{image_folder, record_frames, shared};
+use common::{image_folder, record_frames};
 use toile_capture::{CaptureError, Layer, LockedSubject, Recorder, RecorderOptions, Subject, import, inspect};
 
 fn add(subject: &mut LockedSubject, name: &str, frames: u64) {
@@ -172,7 +172,7 @@ fn broken_subjects_get_one_clear_sentence() {
 }
 
 #[test]
-fn inspection_tells_healthy_from_not() {
+fn inspection_finds_healthy_and_damaged_takes() {
     let temp = tempfile::tempdir().unwrap();
     let folder = image_folder(&temp.path().join("images"), 6);
     let good = inspect(&folder).unwrap();
@@ -245,7 +245,7 @@ fn inspection_of_torn_takes_and_subjects() {
 
 #[test]
 fn real_subject_imports_and_is_healthy() {
-    let Some(data) = shared("subjects/birch") else { return };
+    let Some(data) = toile_outside::data("subjects/birch") else { return };
     let temp = tempfile::tempdir().unwrap();
     let mut subject = LockedSubject::create(&temp.path().join("birch")).unwrap();
     for (name, from) in [("body", "00-body"), ("skirt", "01-skirt")] {

@@ -35,7 +35,7 @@ pub fn straight_limbs(skeleton: &Skeleton, arm_down: f64, leg_out: f64) -> Pose 
             Goal::Level => UnitQuaternion::identity(),
             Goal::Along(child, direction) => {
                 let bone = parent * (skeleton.position(child) - skeleton.position(joint));
-                least_turn(&bone, &direction) * parent
+                minimum_turn(&bone, &direction) * parent
             }
         };
     }
@@ -77,7 +77,7 @@ fn goal(joint: Joint, arm_down: f64, leg_out: f64) -> Goal {
 
 /// Smallest rotation from one direction to another: half a turn where they are opposite, the identity where one is zero.
 /// Safe where they are (nearly) the same: the cosine of rounded unit vectors may exceed 1.
-fn least_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
+fn minimum_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
     let (Some(a), Some(b)) = (from.try_normalize(1e-9), to.try_normalize(1e-9)) else {
         return UnitQuaternion::identity();
     };
@@ -128,7 +128,7 @@ mod tests {
                 skeleton.rest.copy_from_slice(&at);
             }
         }
-        let turn = |a: [f64; 3], b: [f64; 3]| least_turn(&Vector3::from(a), &Vector3::from(b)).angle();
+        let turn = |a: [f64; 3], b: [f64; 3]| minimum_turn(&Vector3::from(a), &Vector3::from(b)).angle();
         assert_eq!(turn([1.0, 0.0, 0.0], [3.0, 0.0, 0.0]), 0.0);
         assert!((turn([0.0, 2.0, 0.0], [0.0, -1.0, 0.0]) - std::f64::consts::PI).abs() < 1e-12);
         assert_eq!(turn([0.0; 3], [0.0, -1.0, 0.0]), 0.0);

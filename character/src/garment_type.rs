@@ -1,4 +1,4 @@
-//! What kind of garment a layer is: one type for all stages.
+//! The kind of garment that a layer is: one type for all stages.
 //!
 //! `subject.toml` holds a layer's type as text, which `capture` neither reads nor changes (it knows no garments); the
 //! command line and the pipeline parse it once, here.

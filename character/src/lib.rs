@@ -1,5 +1,5 @@
-//! The body asset, skeleton, joint names, poses, skin weights and skinning: what fitting, garments, animation and
-//! avatar all speak.
+//! The body asset, skeleton, joint names, poses, skin weights and skinning: the types that fitting, garments, animation and
+//! avatar share.
 //!
 //! - [`joint`]: the 52 VRM humanoid joints and their hierarchy;
 //! - [`Skeleton`]: where the joints of one person rest; [`Pose`]: how they are turned; [`joint_limits`]: how far they go;
@@ -8,7 +8,7 @@
 //! - [`dress_pose`]: the A- and T-pose of any skeleton;
 //! - [`Motion`]: a pose over time; [`interpolation`]: poses between poses;
 //! - [`two_bone`], [`feet`]: inverse kinematics of arms and legs, feet kept out of the floor;
-//! - [`GarmentType`]: what kind of garment a layer is.
+//! - [`GarmentType`]: the kind of garment that a layer is.
 //!
 //! Subject frame: +Y up, +Z the front, +X the subject's left; metres, radians, seconds.
 //!

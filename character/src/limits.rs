@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_hold_alike_for_a_rotation_told_from_another_rest() {
+    fn limits_hold_alike_for_a_rotation_given_from_another_rest() {
         let skeleton = BodyModel::load_default().unwrap().mean_skeleton;
         let t = t_pose(&skeleton);
         let world = |pose: &Pose, joint: Joint| pose.joint_frames(&skeleton)[joint.index()].rotation;

@@ -22,7 +22,7 @@ use common::{Numbers, joint_distance, strangers, surface};
 fn stranger(model: &BodyModel) -> (SkinnedMesh, Pose, Mesh) {
     let body = strangers::read(model, include_bytes!("../tests/data/strangers6.bin")).swap_remove(2);
     let mut numbers = Numbers(7);
-    let pose = strangers::stance(&body, &mut numbers, 1.0);
+    let pose = strangers::random_pose(&body, &mut numbers, 1.0);
     let truth = surface::split(&body.posed_mesh(&pose));
     let floor = truth.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
     let (mut scan, _) = truth.filter_triangles(|t| truth.corners(t).iter().any(|p| p.y > floor + 0.015));
@@ -42,7 +42,7 @@ const STEPS: [(&str, f32, f32); 5] = [
     ("step/100k/measure-and-judge", 0.95, 1.0),
 ];
 
-/// What one step takes of a fit.
+/// The time of one step of a fit.
 fn step_time(model: &BodyModel, scan: &Mesh, from: f32, to: f32) -> Duration {
     let times = Mutex::new(Vec::new());
     fit_body(model, scan, &FitSettings::default(), &|p| times.lock().unwrap().push((p, Instant::now()))).unwrap();

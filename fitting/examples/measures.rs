@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             brute.add(&name, truth.value(&name).unwrap_or(f64::NAN) - girth);
         }
         let mut numbers = Numbers(k as u64 * 7919 + 1);
-        let pose = strangers::stance(body, &mut numbers, 1.0);
+        let pose = strangers::random_pose(body, &mut numbers, 1.0);
         let scan = strangers::scanned(&model, &body.posed_mesh(&pose), 0.2, 0.002, &mut numbers);
         let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {})?;
         doubted += usize::from(fit.verdict() != Verdict::Trusted);

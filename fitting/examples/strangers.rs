@@ -49,7 +49,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (mut errors, mut seen, mut failures, mut doubted) = (Vec::new(), 0, 0, 0);
     for (k, body) in people.iter().enumerate().skip(first).take(count) {
         let mut numbers = Numbers(k as u64 * 7919 + 1);
-        let pose = strangers::stance(body, &mut numbers, wild);
+        let pose = strangers::random_pose(body, &mut numbers, wild);
         let truth = body.posed_mesh(&pose);
         let scan = if case == "front" {
             let front = pose.rotation(Joint::Hips) * nalgebra::Vector3::z();

@@ -29,7 +29,8 @@ pub enum LandmarkMap {
     /// Landmarks set by hand carry their surroundings along.
     #[default]
     ByHand,
-    /// All landmarks, found ones too, carry the whole body by radial basis functions (papers 004 §2.1.1).
+    /// All landmarks, found ones too, carry the whole body by radial basis functions (the conformation of the V-Man
+    /// project, §2.1.1).
     WholeBody,
 }
 

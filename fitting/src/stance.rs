@@ -30,7 +30,7 @@ pub(crate) fn stance(skeleton: &Skeleton) -> Pose {
         world[joint.index()] = match goal(joint) {
             Some((child, direction)) => {
                 let bone = parent * (skeleton.position(child) - skeleton.position(joint));
-                least_turn(&bone, &direction) * parent
+                minimum_turn(&bone, &direction) * parent
             }
             None if matches!(joint, Joint::LeftFoot | Joint::RightFoot) => UnitQuaternion::identity(),
             None => parent,
@@ -55,7 +55,7 @@ fn goal(joint: Joint) -> Option<(Joint, Vector3<f64>)> {
 }
 
 /// Smallest rotation from one direction to another, also where they are (nearly) the same.
-fn least_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
+fn minimum_turn(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
     let (Some(a), Some(b)) = (from.try_normalize(1e-9), to.try_normalize(1e-9)) else {
         return UnitQuaternion::identity();
     };

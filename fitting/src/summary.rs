@@ -1,4 +1,4 @@
-//! What `body.json` holds.
+//! The content of `body.json`.
 
 use std::collections::BTreeMap;
 

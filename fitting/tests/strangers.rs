@@ -17,7 +17,7 @@ fn strangers_with_a_fifth_missing_are_met_and_trusted() {
     let model = BodyModel::load_default().unwrap();
     for (k, body) in strangers::read(&model, PEOPLE).iter().enumerate() {
         let mut numbers = Numbers(k as u64 * 7919 + 1);
-        let pose = strangers::stance(body, &mut numbers, 1.0);
+        let pose = strangers::random_pose(body, &mut numbers, 1.0);
         let truth = body.posed_mesh(&pose);
         let scan = strangers::scanned(&model, &truth, 0.2, 0.002, &mut numbers);
         let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {}).unwrap();
@@ -37,7 +37,7 @@ fn one_view_of_a_kinect_v2_gives_a_body_that_is_doubted_but_near() {
     let model = BodyModel::load_default().unwrap();
     for (k, body) in strangers::read(&model, PEOPLE).iter().enumerate().take(2) {
         let mut numbers = Numbers(k as u64 * 7919 + 1);
-        let pose = strangers::stance(body, &mut numbers, 1.0);
+        let pose = strangers::random_pose(body, &mut numbers, 1.0);
         let truth = body.posed_mesh(&pose);
         let front = pose.rotation(Joint::Hips) * nalgebra::Vector3::z();
         let scan = strangers::one_view(&truth, front.x.atan2(front.z), &mut numbers);
@@ -57,7 +57,7 @@ fn joints_by_mean_value_coordinates_and_fewer_components_are_selectable() {
     let model = BodyModel::load_default().unwrap();
     let body = &strangers::read(&model, PEOPLE)[3];
     let mut numbers = Numbers(3);
-    let pose = strangers::stance(body, &mut numbers, 1.0);
+    let pose = strangers::random_pose(body, &mut numbers, 1.0);
     let truth = body.posed_mesh(&pose);
     let scan = strangers::scanned(&model, &truth, 0.0, 0.001, &mut numbers);
     let run = |components, joints| {

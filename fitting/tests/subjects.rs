@@ -2,25 +2,15 @@
 
 mod common;
 
-use std::path::PathBuf;
-
 use toile_character::BodyModel;
 use toile_fitting::{FitSettings, Verdict, fit_body};
 use toile_geometry::{bvh::Bvh, ply};
-
-fn subject(name: &str) -> Option<PathBuf> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/subjects").join(name);
-    folder.is_dir().then_some(folder)
-}
 
 #[test]
 fn the_true_skin_of_take_0_is_met() {
     let model = BodyModel::load_default().unwrap();
     for name in ["alder", "birch"] {
-        let Some(folder) = subject(name) else {
-            println!("skipped: no private subjects");
-            return;
-        };
+        let Some(folder) = toile_outside::data(&format!("subjects/{name}")) else { return };
         let truth = ply::read(&folder.join("00-body/truth/body.ply")).unwrap();
         // what a camera at breast height sees: neither soles nor crown
         let top = truth.positions.iter().map(|p| p.y).fold(0.0f32, f32::max);

@@ -176,7 +176,7 @@ fn an_arm_that_went_astray_under_its_sleeve_is_brought_back_by_its_hand() {
 }
 
 #[test]
-fn a_smaller_person_is_no_match() {
+fn a_smaller_person_does_not_match() {
     let model = BodyModel::load_default().unwrap();
     let truth = person(&model, 13, 0.0);
     let body = model.skinned(&truth.beta);

@@ -18,7 +18,7 @@ use toile_capture::Frame;
 use toile_fusion::{
     Fuser, FusionSettings, fuse,
     steps::{
-        CutDepth, Rectifier, Tsdf, View, drop_edges, extract_surface, integrate, ray_cast, surface_elements, track,
+        CutDepth, DepthView, Rectifier, Tsdf, drop_edges, extract_surface, integrate, ray_cast, surface_elements, track,
     },
     survey,
 };
@@ -68,7 +68,7 @@ struct Material {
     scene: Scene,
     size: String,
     frames: Vec<Frame>,
-    views: Vec<View>,
+    views: Vec<DepthView>,
     poses: Vec<Rigid>,
 }
 

@@ -49,10 +49,12 @@ impl fmt::Display for DropReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unreadable(message) => f.write_str(message),
-            Self::NoDepth => f.write_str("no depth image of the sensor's size"),
+            Self::NoDepth => f.write_str("its depth image is missing or not of the sensor's size"),
             Self::TooFewPixels { pixels } => write!(f, "only {pixels} pixels of the subject are seen"),
             Self::TooLittleSurface => f.write_str("too little surface to begin with"),
-            Self::NoKnownPose => write!(f, "no known pose within {} ms of it", KNOWN_POSE_WITHIN_NS / 1_000_000),
+            Self::NoKnownPose => {
+                write!(f, "a known pose within {} ms of it is missing", KNOWN_POSE_WITHIN_NS / 1_000_000)
+            }
             Self::LittleOverlap { overlap } => {
                 write!(f, "lost: {:.0} % of its points lie on the model", overlap * 100.0)
             }

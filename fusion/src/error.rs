@@ -1,4 +1,4 @@
-//! What can go wrong while fusing.
+//! Errors of fusion.
 
 /// Why there is no scan. A poor scan is not an error but a warning in the report.
 #[derive(Debug, thiserror::Error)]
@@ -18,7 +18,7 @@ pub enum FusionError {
          the volume `all`"
     )]
     NobodyInIt {
-        /// What was looked for and not found.
+        /// The thing that was looked for and not found.
         reason: String,
     },
     /// The settings contradict themselves.
@@ -29,7 +29,7 @@ pub enum FusionError {
     Calibration {
         /// Index of the sensor.
         sensor: usize,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// Tracking found no frames that agree.

@@ -9,6 +9,6 @@ mod summary;
 mod whole;
 
 #[cfg(test)]
-pub(crate) use {closing::close, whole::least_weight};
+pub(crate) use {closing::close, whole::minimum_weight};
 
 pub use whole::finish;

@@ -15,4 +15,4 @@ pub use cut_depth::CutDepth;
 pub use depth_filter::drop_edges;
 pub use normals::surface_elements;
 pub use rectifier::Rectifier;
-pub use view::View;
+pub use view::DepthView;

@@ -1,4 +1,4 @@
-//! What a review found: cases that are rare on a turntable. Each test fails when its mend is taken back.
+//! Cases that are rare on a turntable, found by a review. Each test fails when its mend is taken back.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use toile_geometry::{Rigid, camera::PinholeCamera};
 use crate::{
     DropReason, Fuser, FusionError, FusionSettings, KnownPose, Outcome, Prior, Volume,
     field::{Tsdf, extract_surface, integrate},
-    frame::View,
+    frame::DepthView,
     fuse,
     test_scene::{Memory, Scene, figure_distance, steps},
 };
@@ -92,8 +92,8 @@ fn a_hand_held_camera_that_was_lost_for_long_is_found_at_a_place_it_has_seen() {
     // It looks at a wall for five frames, and is back where it was six frames before that.
     frames.extend((10..15).map(|k| frame_of(&scene, k, |u, v| 1500 + (2 * u + v) as u16)));
     frames.push(Frame { index: 15, device_time_ns: 3_000_000_000, ..frames[4].clone() });
-    let told: Vec<bool> = frames.iter().map(|f| matches!(fuser.push(f).unwrap(), Outcome::Fused { .. })).collect();
-    assert_eq!(told, [vec![true; 10], vec![false; 5], vec![true]].concat());
+    let reported: Vec<bool> = frames.iter().map(|f| matches!(fuser.push(f).unwrap(), Outcome::Fused { .. })).collect();
+    assert_eq!(reported, [vec![true; 10], vec![false; 5], vec![true]].concat());
     let off = fuser.kept.frames[10].model_from_camera.inverse() * fuser.kept.frames[4].model_from_camera;
     assert!(off.translation.vector.norm() < 0.01 && off.rotation.angle() < 0.01, "{off}");
 }
@@ -131,12 +131,12 @@ fn frames_that_make_no_surface_are_an_error_and_no_empty_scan() {
     assert!(error.to_string().contains("no surface"), "{error}");
 }
 
-/// What is far must not fall between samples whose spacing suits what is near.
+/// Far surfaces must not fall between samples whose spacing suits near ones.
 #[test]
 fn a_far_wall_beside_much_that_is_near_has_no_gaps() {
     let camera = PinholeCamera::ideal(240, 180, 150.0, 150.0, 119.5, 89.5);
     let depth: Vec<f32> = (0..240 * 180).map(|i| if i % 240 < 160 { 0.7 } else { 5.5 }).collect();
-    let view = View::new(&camera, &depth, 2);
+    let view = DepthView::new(&camera, &depth, 2);
     let mut field = Tsdf::new(0.008, 0.024, false);
     integrate(&mut field, &view, &Rigid::identity()).unwrap();
     let mesh = extract_surface(&field, 1);
@@ -155,7 +155,7 @@ fn a_far_wall_beside_much_that_is_near_has_no_gaps() {
 fn a_slanted_wall_as_near_as_its_blocks_are_long_lies_where_it_is() {
     let camera = PinholeCamera::ideal(160, 120, 110.0, 110.0, 79.5, 59.5);
     let depth = |i: usize| (1.35 / (1.0 - 0.4 * ((i % 160) as f64 - 79.5) / 110.0)) as f32;
-    let view = View::new(&camera, &(0..160 * 120).map(depth).collect::<Vec<_>>(), 2);
+    let view = DepthView::new(&camera, &(0..160 * 120).map(depth).collect::<Vec<_>>(), 2);
     let mut field = Tsdf::new(0.05, 0.1, false);
     integrate(&mut field, &view, &Rigid::identity()).unwrap();
     let mesh = extract_surface(&field, 1);
@@ -167,7 +167,7 @@ fn a_slanted_wall_as_near_as_its_blocks_are_long_lies_where_it_is() {
 #[test]
 fn places_too_far_for_their_digits_are_refused_or_fused_but_never_a_panic() {
     let camera = PinholeCamera::ideal(80, 60, 60.0, 60.0, 39.5, 29.5);
-    let view = View::new(&camera, &vec![1.5; 80 * 60], 2);
+    let view = DepthView::new(&camera, &vec![1.5; 80 * 60], 2);
     for digits in 2..12 {
         let far = Rigid::translation(10f64.powi(digits), -3.3 * 10f64.powi(digits), 0.7);
         let mut field = Tsdf::new(0.004, 0.016, false);

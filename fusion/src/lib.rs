@@ -47,6 +47,6 @@ pub use tracking::Tracked;
 /// The steps of a frame one by one, for benchmarks and experiments.
 pub mod steps {
     pub use crate::field::{Tsdf, extract_surface, integrate, ray_cast};
-    pub use crate::frame::{CutDepth, Rectifier, View, drop_edges, surface_elements};
+    pub use crate::frame::{CutDepth, DepthView, Rectifier, drop_edges, surface_elements};
     pub use crate::tracking::track;
 }

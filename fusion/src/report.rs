@@ -1,4 +1,4 @@
-//! What the stage decided.
+//! The decisions of the stage.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +30,7 @@ pub struct VolumeReport {
     pub image_up: ImageSide,
 }
 
-/// What the stage decided.
+/// The decisions of the stage.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FusionReport {
     /// Settings as resolved.
@@ -84,6 +84,6 @@ pub struct FusionReport {
     pub filled_percent: f64,
     /// True when the scan is closed.
     pub watertight: bool,
-    /// What the operator should know.
+    /// Warnings for the operator.
     pub warnings: Vec<String>,
 }

@@ -15,7 +15,7 @@ pub struct TrackedFrame {
     pub device_time_ns: i64,
     /// Pose of the depth camera in the scan's frame.
     pub scan_from_camera: Rigid,
-    /// What tracking said when the frame was first registered; `None` for known poses and the first frame.
+    /// The result of tracking when the frame was first registered; `None` for known poses and the first frame.
     pub tracked: Option<Tracked>,
 }
 
@@ -27,7 +27,7 @@ pub struct Scan {
     pub mesh: Mesh,
     /// The fused frames in the order of time.
     pub trajectory: Vec<TrackedFrame>,
-    /// What was decided.
+    /// The decisions.
     pub report: FusionReport,
     /// How long it took.
     pub timings: Timings,

@@ -1,4 +1,4 @@
-//! What a caller may choose; every field has a default that suits a person on a turntable.
+//! The choices of a caller; every field has a default that suits a person on a turntable.
 
 use serde::{Deserialize, Serialize};
 use toile_geometry::Rigid;
@@ -8,7 +8,7 @@ use crate::FusionError;
 /// A known pose belongs to a frame whose device time is at most this far from its own, nanoseconds.
 pub(crate) const KNOWN_POSE_WITHIN_NS: i64 = 5_000_000;
 
-/// What of the frames is fused.
+/// The frames that are fused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Volume {
@@ -19,7 +19,7 @@ pub enum Volume {
     All,
 }
 
-/// What is assumed about the motion between frames.
+/// The assumption about the motion between frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Prior {
@@ -47,7 +47,7 @@ pub struct FusionSettings {
     pub voxel_size: f64,
     /// Truncation distance of the signed distance field, metres. Default 0.016; at least two voxels.
     pub truncation: f64,
-    /// What is fused. Default: the subject alone.
+    /// The surfaces that are fused. Default: the subject alone.
     pub volume: Volume,
     /// Assumption about the motion. Default: a turntable.
     pub prior: Prior,

@@ -45,7 +45,7 @@ fn paint(p: &Point3<f64>) -> [u8; 3] {
     [(128.0 + 45.0 * wave) as u8; 3]
 }
 
-/// What is rendered.
+/// The images that are rendered.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
     /// Signed distance to the figure, figure frame.

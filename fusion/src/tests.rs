@@ -6,8 +6,8 @@ use toile_geometry::{Rigid, ply, topology::Edges};
 use crate::{
     DropReason, FusionError, FusionSettings, ImageSide, KnownPose, Outcome, Prior, Scan, SubjectVolume, Volume,
     field::{Tsdf, VOXELS, extract_surface, integrate, ray_cast},
-    finish::{close, least_weight},
-    frame::{CutDepth, Rectifier, View, drop_edges, unproject},
+    finish::{close, minimum_weight},
+    frame::{CutDepth, DepthView, Rectifier, drop_edges, unproject},
     fuse,
     subject::find_volume,
     survey,
@@ -20,7 +20,7 @@ fn settings() -> FusionSettings {
 }
 
 /// The figure alone.
-fn view(scene: &Scene, angle: f64, seed: u64) -> View {
+fn view(scene: &Scene, angle: f64, seed: u64) -> DepthView {
     let bare = Scene { with_floor: false, with_wall: false, ..scene.clone() };
     let rig = bare.rig();
     let rectifier = Rectifier::new(&rig.sensors[0], 6.0);
@@ -92,7 +92,7 @@ fn a_plane_and_a_sphere_come_out_where_they_are() {
     let depth: Vec<f32> =
         (0..160 * 120).map(|i| sphere(unproject(&camera, (i % 160) as f32, (i / 160) as f32, 1.0))).collect();
     let filtered = drop_edges(&camera, &depth, 8.3);
-    let view = View::new(&camera, &filtered, 2);
+    let view = DepthView::new(&camera, &filtered, 2);
     let mut tsdf = Tsdf::new(0.004, 0.016, false);
     integrate(&mut tsdf, &view, &Rigid::identity()).unwrap();
     let mesh = extract_surface(&tsdf, 1);
@@ -135,7 +135,7 @@ fn a_solid_sphere_is_extracted_closed_and_manifold() {
 fn joint_optimisation_recovers_disturbed_poses() {
     let scene = Scene { noise: 0.001, ..Scene::new() };
     let angles: Vec<f64> = (0..24).map(|i| f64::from(i) * 15.3f64.to_radians()).collect();
-    let views: Vec<View> = angles.iter().enumerate().map(|(i, &a)| view(&scene, a, i as u64)).collect();
+    let views: Vec<DepthView> = angles.iter().enumerate().map(|(i, &a)| view(&scene, a, i as u64)).collect();
     let truth: Vec<Rigid> = angles.iter().map(|&a| scene.figure_from_camera(a)).collect();
     let mut poses: Vec<Rigid> = truth
         .iter()
@@ -208,9 +208,9 @@ fn the_disk_is_found_where_it_is_however_noisy_it_is() {
 #[test]
 fn a_surface_needs_more_weight_in_a_longer_take_of_a_subject_that_turns() {
     let turning = settings();
-    assert_eq!([3, 100, 200, 2000].map(|frames| least_weight(&turning, true, frames)), [2, 2, 4, 40]);
+    assert_eq!([3, 100, 200, 2000].map(|frames| minimum_weight(&turning, true, frames)), [2, 2, 4, 40]);
     let hand_held = FusionSettings { prior: Prior::None, ..settings() };
-    assert_eq!((least_weight(&hand_held, true, 2000), least_weight(&turning, false, 2000)), (2, 2));
+    assert_eq!((minimum_weight(&hand_held, true, 2000), minimum_weight(&turning, false, 2000)), (2, 2));
 }
 
 #[test]
@@ -252,12 +252,16 @@ fn a_part_of_a_turn_is_a_warning() {
     let scene = Scene { with_floor: false, ..Scene::new() };
     let scan = fuse(&mut scene.source(&steps(26, -8.0)), &settings(), &|_| {}).unwrap();
     assert!((scan.report.turned_deg - 200.0).abs() < 1.5, "{}", scan.report.turned_deg);
-    assert!(scan.report.warnings.iter().any(|w| w.contains("no full turn: 200°")), "{:?}", scan.report.warnings);
+    assert!(
+        scan.report.warnings.iter().any(|w| w.contains("the turn is not full: 200°")),
+        "{:?}",
+        scan.report.warnings
+    );
     assert!(mean_error(&scan, &scene) < 0.002, "{}", mean_error(&scan, &scene));
 }
 
 #[test]
-fn an_empty_room_is_nobody() {
+fn an_empty_room_holds_nobody() {
     let scene = Scene::new();
     let error = fuse(&mut scene.source(&[None; 12]), &settings(), &|_| {}).unwrap_err();
     assert!(matches!(error, FusionError::NobodyInIt { .. }), "{error}");

@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, time::Instant};
 
 use serde::Serialize;
+use toile_geometry::statistics::{Rank, quantile_of_sorted, sort};
 
 /// Duration of one step over its calls: wall time, and processor time of the whole process in it (all threads).
 /// Beside other work wall time is longer; with one thread and an idle machine both are the same.
@@ -112,11 +113,11 @@ impl StepTiming {
     fn new(calls: &[[f64; 2]]) -> Self {
         let sorted = |which: usize| {
             let mut values: Vec<f64> = calls.iter().map(|c| c[which]).collect();
-            values.sort_unstable_by(f64::total_cmp);
+            sort(&mut values);
             values
         };
         let (wall, cpu) = (sorted(0), sorted(1));
-        let at_ms = |values: &[f64], q: f64| values[((values.len() - 1) as f64 * q).round() as usize] * 1e3;
+        let at_ms = |values: &[f64], q: f64| quantile_of_sorted(values, q, Rank::Nearest).unwrap_or(0.0) * 1e3;
         Self {
             count: calls.len(),
             median_ms: at_ms(&wall, 0.5),

@@ -13,7 +13,7 @@ use std::{error::Error, path::Path, time::Instant};
 
 use toile_character::{BodyModel, Pose, SkinWeights, SkinnedMesh, skinning, transfer::closest_triangle_weights};
 use toile_garments::{
-    ExtractSettings, Extraction, GarmentType, Labelling, StackMethod, StackSettings, Take, extract, stack,
+    DressedTake, ExtractSettings, Extraction, GarmentType, Labelling, StackMethod, StackSettings, extract, stack,
 };
 use toile_geometry::{Mesh, ply};
 
@@ -102,7 +102,7 @@ impl Subject {
     ) -> Result<Mesh, Box<dyn Error>> {
         let scan = ply::read(&input.join(&layers[n]).join("scan.ply"))?;
         let previous = self.previous(ply::read(&input.join(&layers[n - 1]).join("scan.ply"))?, n);
-        let take = Take {
+        let take = DressedTake {
             scan: &scan,
             previous: &previous,
             body: &self.body.posed_mesh(&self.poses[n]),
@@ -129,7 +129,7 @@ fn garment_type(layer: &str) -> Option<GarmentType> {
     layer.split_once('-').map_or(layer, |n| n.1).parse().ok()
 }
 
-fn write(take: &Take, found: &Extraction, out: &Path) -> Result<(), Box<dyn Error>> {
+fn write(take: &DressedTake, found: &Extraction, out: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(out)?;
     ply::write(&out.join("scan.ply"), take.scan)?;
     ply::write(&out.join("previous.ply"), take.previous)?;

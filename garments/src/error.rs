@@ -1,4 +1,4 @@
-//! What can go wrong while a garment is extracted from a scan.
+//! Errors of extracting a garment from a scan.
 
 use toile_character::GarmentType;
 

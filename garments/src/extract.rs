@@ -16,7 +16,7 @@ use crate::{
     report::{ExtractionReport, Warning, warnings},
     settings::{ExtractSettings, Labelling},
     skin::{common_frame, hanging::mark_free},
-    take::Take,
+    take::DressedTake,
 };
 
 /// A take's garment and how it was found.
@@ -31,9 +31,9 @@ pub struct Extraction {
     pub garment: Mesh,
     /// Skin weights of the garment's vertices.
     pub weights: SkinWeights,
-    /// What was decided.
+    /// The decisions.
     pub report: ExtractionReport,
-    /// What to worry about.
+    /// Warnings.
     pub warnings: Vec<Warning>,
 }
 
@@ -44,7 +44,7 @@ pub struct Extraction {
 /// a setting is outside of its range or asks for a template that the garment's type does not have. A take without a new garment is a result with
 /// [`Warning::NothingNew`] and empty meshes.
 pub fn extract(
-    take: &Take,
+    take: &DressedTake,
     settings: &ExtractSettings,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<Extraction, GarmentError> {

@@ -55,7 +55,7 @@ pub use stack::{
     report::{GAP_BINS_MM, LayerReport, StackReport},
     stack,
 };
-pub use take::Take;
+pub use take::DressedTake;
 pub use toile_character::{FREE_PART, GarmentType};
 pub use worn::{
     hidden::hidden_triangles,

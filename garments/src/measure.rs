@@ -12,12 +12,12 @@ pub mod scan_graph;
 use nalgebra::Point3;
 
 use self::{evidence::Evidence, scan_graph::ScanGraph};
-use crate::{settings::ExtractSettings, take::Take};
+use crate::{settings::ExtractSettings, take::DressedTake};
 
 /// A take with everything that was measured on it; nothing in here changes while the take is labelled.
 pub struct Measured<'a> {
     /// The take itself.
-    pub take: &'a Take<'a>,
+    pub take: &'a DressedTake<'a>,
     /// The scan's surface as a graph.
     pub graph: ScanGraph,
     /// The evidence at each vertex of the scan.
@@ -28,7 +28,7 @@ pub struct Measured<'a> {
 
 impl<'a> Measured<'a> {
     /// Measures a take.
-    pub fn new(take: &'a Take<'a>, settings: &ExtractSettings) -> Self {
+    pub fn new(take: &'a DressedTake<'a>, settings: &ExtractSettings) -> Self {
         let graph = ScanGraph::new(take.scan);
         let evidence = evidence::measure(take, &graph, settings);
         Self { take, graph, evidence, bones: take.bones() }

@@ -35,7 +35,7 @@ const ABOVE_LEDGE: f32 = 0.02;
 const LEDGE_LOSS: f32 = 1.0 / 3.0;
 /// Rims with fewer vertices are small holes, and left as they are.
 const FEWEST_RIM_VERTICES: usize = 20;
-/// What crosses itself this near to a rim, and cannot be smoothed apart, is cut away, metres.
+/// Triangles that cross this near to a rim, and cannot be smoothed apart, are cut away, metres.
 const CRUMPLED: f32 = 0.04;
 /// Rounds of that.
 const CRUMPLED_ROUNDS: usize = 4;
@@ -87,7 +87,7 @@ fn bare(scan: &Mesh) -> Mesh {
     Mesh { colors: scan.colors.clone(), ..Mesh::new(scan.positions.clone(), scan.triangles.clone()) }
 }
 
-/// What the mesh carries along from the scan.
+/// Values that the mesh carries along from the scan.
 fn channels(
     labels: &Labels,
     on: &Measured,
@@ -127,7 +127,7 @@ fn field(labels: &Labels, graph: &ScanGraph, edits: Option<&Applied>, settings: 
     field
 }
 
-/// What strokes decided, with a ring around what they took out: the rim that is left.
+/// The decisions of strokes, with a ring around what they took out: the rim that is left.
 fn by_hand(graph: &ScanGraph, edits: &Applied) -> Vec<f32> {
     let is_beside_cut = |v: usize| {
         let taken = Some(Mark::DoesNotBelong);

@@ -1,4 +1,4 @@
-//! What the extraction of a garment decided, and what to worry about.
+//! The decisions of extracting a garment, and its warnings.
 
 use std::collections::BTreeMap;
 
@@ -24,13 +24,13 @@ const OPENING: f32 = 0.15;
 const SUNKEN: f32 = 0.012;
 const SUNKEN_NOISE: f32 = 4.0;
 /// A sunken surface faces as the surface worn before does, up to this angle (cosine).
-const SUNKEN_FACING: f32 = 0.5;
+const SUNKEN_ALIGNMENT: f32 = 0.5;
 /// A larger sunken area makes a warning, square metres.
 const SUNKEN_AREA: f32 = 0.03;
 /// Labels less sure than this are counted as unsure.
 const UNSURE: f32 = 0.7;
 
-/// What an operator should know about a layer.
+/// A warning about a layer, for the operator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Warning {
     /// Nothing new is worn in this take.
@@ -58,7 +58,7 @@ impl std::fmt::Display for Warning {
     }
 }
 
-/// What the extraction decided, for the layer's report.
+/// The decisions of the extraction, for the layer's report.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ExtractionReport {
     /// Known or guessed type.
@@ -130,7 +130,7 @@ fn openings(garment: &Mesh) -> Vec<f32> {
     openings
 }
 
-/// What to worry about: `uncovered_m2` is the area that looked new and was only uncovered.
+/// Warnings: `uncovered_m2` is the area that looked new and was only uncovered.
 pub(crate) fn warnings(
     on: &Measured,
     labels: &Labels,
@@ -155,7 +155,7 @@ fn sunken_area(on: &Measured, labels: &Labels) -> f32 {
     let (graph, evidence) = (&on.graph, &on.evidence);
     let sunken = SUNKEN.max(SUNKEN_NOISE * evidence.height_noise);
     let seen = |v: usize| graph.filled[v] < 0.5 && (graph.lab.is_empty() || !evidence.color[v].is_nan());
-    let inside = |&v: &usize| evidence.height[v] < -sunken && evidence.facing[v] > SUNKEN_FACING;
+    let inside = |&v: &usize| evidence.height[v] < -sunken && evidence.alignment[v] > SUNKEN_ALIGNMENT;
     let area = |v: usize| graph.areas[v];
     (0..graph.len()).filter(|&v| seen(v) && !labels.garment[v]).filter(inside).map(area).sum()
 }

@@ -37,7 +37,7 @@ pub struct ExtractSettings {
     pub rounds: usize,
     /// Standard deviation of the smoothing that rounds the hem, metres, 0 to 0.05. Default 0.008.
     pub hem_smoothing: f32,
-    /// What a scan lacks at the edge of cloth that nothing lies close behind, metres, 0 to 0.03: the camera's outermost
+    /// Width that a scan lacks at the edge of cloth that nothing lies close behind, metres, 0 to 0.03: the camera's outermost
     /// pixel is mixed and filtered away, and half a pixel is lost by sampling. 0 trusts the scan's edge. Default 0.008
     /// (1.5 pixels of a depth camera that sees 5.5 mm a pixel).
     pub edge_loss: f32,
@@ -165,11 +165,11 @@ impl StackSettings {
     }
 }
 
-/// What an export leaves out because clothes hide it.
+/// Triangles that an export leaves out because clothes hide them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CullSettings {
-    /// What lies nearer to skin or cloth in sight is kept, metres along the surface, 0 to 1: so far a hem may move.
+    /// Triangles nearer than this to skin or cloth in sight are kept, metres along the surface, 0 to 1: so far a hem may move.
     /// Default 0.03.
     pub margin: f32,
     /// Cloth this far off still hides, metres, 0.01 to 1. Default 0.1.

@@ -1,4 +1,4 @@
-//! What is known of a take before its garment is extracted.
+//! A take before its garment is extracted.
 
 use nalgebra::Point3;
 use toile_character::{GarmentType, Pose, Skeleton, SkinWeights, joint::JOINTS};
@@ -8,7 +8,7 @@ use crate::{edits::format::Edits, error::GarmentError};
 
 /// A dressed take with all that earlier stages found. All meshes are in the scan's frame, metres.
 #[derive(Debug, Clone, Copy)]
-pub struct Take<'a> {
+pub struct DressedTake<'a> {
     /// The new scan, with colours and the attribute `filled`.
     pub scan: &'a Mesh,
     /// The surface worn before (the scan of the take before), posed into this scan, with colours.
@@ -29,7 +29,7 @@ pub struct Take<'a> {
     pub edits: Option<&'a Edits>,
 }
 
-impl Take<'_> {
+impl DressedTake<'_> {
     /// Checks that meshes, weights and edits can be used together.
     pub(crate) fn check(&self) -> Result<(), GarmentError> {
         for (mesh, name) in [(self.scan, "scan"), (self.previous, "earlier layers' surface"), (self.body, "body")] {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::{Mesh, bvh::Bvh};
 
 /// A source triangle counts as facing the same way above this cosine between the normals.
-const FACING: f32 = 0.2;
+const MIN_COSINE: f32 = 0.2;
 /// Source vertices with an attribute `filled` above this were never seen, and give no colour where another is near.
 const SEEN: f32 = 0.5;
 /// How much farther than the nearest a better (seen, facing) triangle may be, metres.
@@ -20,11 +20,11 @@ pub fn closest_colors(source: &Mesh, targets: &[Point3<f32>], normals: &[Vector3
         return Vec::new();
     }
     let bvh = Bvh::new(&source.positions, &source.triangles);
-    let facing = source.triangle_normals();
+    let source_normals = source.triangle_normals();
     let filled = source.attributes.get("filled");
     let seen = |t: u32| filled.is_none_or(|f| source.triangles[t as usize].iter().all(|&v| f[v as usize] < SEEN));
     let color = |(p, n): (&Point3<f32>, &Vector3<f32>)| {
-        let fits = |t: u32| seen(t) && (*n == Vector3::zeros() || facing[t as usize].dot(n) > FACING);
+        let fits = |t: u32| seen(t) && (*n == Vector3::zeros() || source_normals[t as usize].dot(n) > MIN_COSINE);
         let nearest = bvh.closest(p, f32::INFINITY)?;
         let reach = nearest.distance + DETOUR;
         let hit = if fits(nearest.triangle) { nearest } else { bvh.closest_where(p, reach, fits).unwrap_or(nearest) };
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn no_colour_is_no_colour() {
+    fn missing_colours_stay_missing() {
         let bare = Mesh { colors: Vec::new(), ..sheets() };
         assert!(closest_colors(&bare, &[Point3::origin()], &[Vector3::z()]).is_empty());
     }

@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn fans_are_told_apart_whatever_the_order_of_their_triangles() {
+    fn fans_are_distinguished_whatever_the_order_of_their_triangles() {
         // Around vertex 0: a closed fan of six, an open one of three, and both together.
         let closed: Vec<[u32; 3]> = (0..6).map(|k| [0, 1 + k, 1 + (k + 1) % 6]).collect();
         let open: Vec<[u32; 3]> = (0..3).map(|k| [0, 10 + k, 11 + k]).collect();

@@ -14,7 +14,7 @@ mod loops;
 pub fn cut_handles(mesh: &Mesh, longest: f32) -> (Mesh, usize) {
     let mut out = mesh.clone();
     let mut count = 0;
-    while let Some(cycle) = loops::shortest(&out, longest) {
+    while let Some(cycle) = loops::shortest_cycle(&out, longest) {
         let Some(cut) = cut_along(&out, &cycle) else { break };
         out = cut;
         count += 1;

@@ -20,7 +20,7 @@ use patch::Patch;
 pub const FILLED: &str = "filled";
 
 /// A plate with more than this many times the membrane's area bulges too far over the hole and is not used.
-const MOST_BULGE: f64 = 1.2;
+const MAX_BULGE: f64 = 1.2;
 
 /// Holes that were closed and left open.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -85,7 +85,7 @@ fn close(
         patch.tighten();
         let membrane = patch.clone();
         relax::relax(&mut patch, mesh, around, &reversed);
-        if patch.area() > MOST_BULGE * membrane.area() {
+        if patch.area() > MAX_BULGE * membrane.area() {
             patch = membrane;
         }
         patch
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn long_borders_stay_open_when_told() {
+    fn long_borders_stay_open_when_asked() {
         let mesh = open_sphere(20, 2..12);
         let (kept, filled) = fill_holes(&mesh, 3.0);
         assert_eq!(filled.holes, 1);

@@ -312,7 +312,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_cut_is_the_least_of_all(
+        fn the_cut_is_the_minimum(
             terminals in prop::collection::vec((0i64..20, 0i64..20), 2..10),
             raw in prop::collection::vec((0u32..10, 0u32..10, 0i64..15, 0i64..15), 0..30),
         ) {

@@ -118,9 +118,9 @@ impl Work {
         (b - a).cross(&(c - a))
     }
 
-    fn split_long(&mut self, longest: f32) {
+    fn split_long(&mut self, max_length: f32) {
         let mut edges: Vec<(f32, [u32; 2])> = self.edges().into_iter().map(|e| (self.length(e), e)).collect();
-        edges.retain(|e| e.0 > longest);
+        edges.retain(|e| e.0 > max_length);
         edges.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         for (_, [a, b]) in edges {
             let both = self.at_edge([a, b]);
@@ -141,20 +141,20 @@ impl Work {
         }
     }
 
-    fn collapse_short(&mut self, shortest: f32, longest: f32) {
+    fn collapse_short(&mut self, min_length: f32, max_length: f32) {
         let mut edges: Vec<(f32, [u32; 2])> = self.edges().into_iter().map(|e| (self.length(e), e)).collect();
-        edges.retain(|e| e.0 < shortest);
+        edges.retain(|e| e.0 < min_length);
         edges.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         for (_, [a, b]) in edges {
             let exists = !self.at_edge([a, b]).is_empty();
-            if exists && self.length([a, b]) < shortest {
-                self.collapse(a, b, longest);
+            if exists && self.length([a, b]) < min_length {
+                self.collapse(a, b, max_length);
             }
         }
     }
 
     /// Merges b into a where that keeps the surface a surface.
-    fn collapse(&mut self, a: u32, b: u32, longest: f32) {
+    fn collapse(&mut self, a: u32, b: u32, max_length: f32) {
         let both = self.at_edge([a, b]);
         let (rim_a, rim_b) = (self.on_rim(a), self.on_rim(b));
         let (na, nb) = (self.neighbors(a), self.neighbors(b));
@@ -168,7 +168,7 @@ impl Work {
             (false, true) => self.positions[b as usize],
             _ => nalgebra::center(&self.positions[a as usize], &self.positions[b as usize]),
         };
-        let too_long = |n: &u32| (self.positions[*n as usize] - target).norm() > longest;
+        let too_long = |n: &u32| (self.positions[*n as usize] - target).norm() > max_length;
         if na.iter().chain(&nb).any(|n| *n != a && *n != b && too_long(n)) || !self.keeps_sides(a, b, &both, target) {
             return;
         }

@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use toile_capture::{Replay, Source};
 use toile_driver_webcam::{ColorBeside, ColorCalibration, Webcam};
 
-use crate::{LiveError, stop::Pace};
+use crate::{DeviceError, LiveError, stop::Pace};
 
 /// A camera whose colour is put beside a depth camera's frames, and the file of its calibration.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,18 +64,15 @@ impl Color {
         if pace != self.pace() {
             let reason =
                 "--color: a camera does not wait for a recording or the virtual sensor; take both live or neither";
-            return Err(LiveError::Settings(reason.into()));
+            return Err(LiveError::Usage(reason.into()));
         }
-        let settings = |error: toile_driver_webcam::WebcamError| LiveError::Settings(error.to_string());
-        let calibration = ColorCalibration::read(&self.calibration).map_err(settings)?;
+        let calibration = ColorCalibration::read(&self.calibration).map_err(LiveError::Color)?;
         let size = (calibration.camera.width, calibration.camera.height);
         let color: Box<dyn Source> = match &self.camera {
-            Camera::Webcam(index) => {
-                Box::new(Webcam::open(*index, Some(size)).map_err(|error| LiveError::Device(error.to_string()))?)
-            }
+            Camera::Webcam(index) => Box::new(Webcam::open(*index, Some(size)).map_err(DeviceError::from)?),
             Camera::Replay(file) => Box::new(Replay::open(file)?),
         };
-        Ok(Box::new(ColorBeside::new(depth, color, &calibration, pace == Pace::Live).map_err(settings)?))
+        Ok(Box::new(ColorBeside::new(depth, color, &calibration, pace == Pace::Live).map_err(LiveError::Color)?))
     }
 }
 

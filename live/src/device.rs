@@ -15,7 +15,7 @@ use toile_driver_transport::{libusb::LibusbBus, video::kernel::KernelVideo};
 use toile_driver_uvc_depth::{self as uvc_depth, UvcDepthCamera};
 use toile_synthetic::{GarmentKind, GarmentSettings, SyntheticSettings};
 
-use crate::{LiveError, stop::Pace};
+use crate::{DeviceError, LiveError, stop::Pace};
 
 /// How devices are written.
 pub const DEVICES: &str = "kinect1[:SERIAL], kinect2[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION, stereo:FILE, replay:FILE, \
@@ -73,7 +73,7 @@ impl Device {
         }
     }
 
-    /// What a recording lost before it came here (torn or damaged), in words.
+    /// Losses of a recording before it came here (torn or damaged), in words.
     ///
     /// # Errors
     /// [`LiveError`] where it cannot be read at all.
@@ -87,36 +87,35 @@ impl Device {
     /// # Errors
     /// [`LiveError`] says what is missing and what to do.
     pub fn open(&self, subject: &Subject, layer: &Layer) -> Result<Box<dyn Source>, LiveError> {
-        let failed = |reason: String| LiveError::Device(reason);
         let video = KernelVideo::default();
         match self {
             Self::Synthetic(seed) => {
                 let settings = synthetic(*seed, subject, layer)?;
                 let opened = SyntheticDevice::open(&settings, layer.number);
-                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+                Ok(Box::new(opened.map_err(DeviceError::from)?))
             }
             Self::Replay(file) => Ok(Box::new(Replay::open(file)?)),
             Self::Kinect1(serial) => {
-                let bus = LibusbBus::new().map_err(|e| failed(e.to_string()))?;
+                let bus = LibusbBus::new().map_err(DeviceError::from)?;
                 let opened = Kinect1::open(&bus, serial.as_deref(), kinect1::Settings::default());
-                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+                Ok(Box::new(opened.map_err(DeviceError::from)?))
             }
             Self::Kinect2(serial) => {
-                let bus = LibusbBus::new().map_err(|e| failed(e.to_string()))?;
+                let bus = LibusbBus::new().map_err(DeviceError::from)?;
                 let opened = Kinect2::open(&bus, serial.as_deref(), kinect2::Settings::default());
-                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+                Ok(Box::new(opened.map_err(DeviceError::from)?))
             }
             Self::Realsense(serial) => {
                 let opened = Realsense::open(&video, serial.as_deref(), realsense::Settings::default());
-                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+                Ok(Box::new(opened.map_err(DeviceError::from)?))
             }
             Self::Stereo(file) => {
                 let opened = StereoCamera::open(&video, &stereo_settings(file)?);
-                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+                Ok(Box::new(opened.map_err(DeviceError::from)?))
             }
             Self::Uvc(node, calibration) => {
                 let opened = UvcDepthCamera::open(&video, node, calibration, uvc_depth::Settings::default());
-                Ok(Box::new(opened.map_err(|e| failed(e.to_string()))?))
+                Ok(Box::new(opened.map_err(DeviceError::from)?))
             }
         }
     }
@@ -125,7 +124,7 @@ impl Device {
 /// Settings of a stereo rig (TOML); files that they name are looked for beside them.
 fn stereo_settings(file: &Path) -> Result<StereoSettings, LiveError> {
     let text = std::fs::read_to_string(file).map_err(|e| CaptureError::io(file, e))?;
-    let wrong = |e: toml::de::Error| LiveError::Settings(format!("{}: {}", file.display(), e.message()));
+    let wrong = |e: toml::de::Error| LiveError::settings(file, e.message());
     let mut settings: StereoSettings = toml::from_str(&text).map_err(wrong)?;
     let beside = file.parent().unwrap_or(Path::new(""));
     settings.calibration.iter_mut().for_each(|path| *path = beside.join(&*path));
@@ -138,7 +137,7 @@ fn synthetic(seed: u64, subject: &Subject, layer: &Layer) -> Result<SyntheticSet
     let names: Vec<&str> = if layer.number == 0 { Vec::new() } else { worn.map(|l| l.name.as_str()).collect() };
     let garment = |name: &&str| {
         let kinds = GarmentKind::ALL.map(GarmentKind::name).join(", ");
-        let unknown = || LiveError::Settings(format!("--layer: the virtual person has no `{name}`; choose of {kinds}"));
+        let unknown = || LiveError::Usage(format!("--layer: the virtual person has no `{name}`; choose of {kinds}"));
         GarmentKind::from_name(name).map(GarmentSettings::of).ok_or_else(unknown)
     };
     let garments = names.iter().map(garment).collect::<Result<_, _>>()?;

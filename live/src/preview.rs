@@ -16,19 +16,19 @@ use crate::{stop::Pace, turn::Turn};
 /// Frames of each sensor that may wait.
 const ROOM: usize = 8;
 /// Frames that are kept until somebody is seen to move.
-const MOST_KEPT: usize = 96;
+const MAX_KEPT: usize = 96;
 /// The preview looks for a person once this many frames have arrived, and again at every doubling.
 const FIRST_LOOK: usize = 12;
 /// Voxels of the preview, metres: eight times fewer than the scan's.
 const VOXEL: f64 = 0.008;
-/// So many frames in a row that cannot be placed start the preview anew.
+/// This many frames in a row that cannot be placed start the preview anew.
 const LOST: usize = 12;
 /// A sensor that gave no depth while this many frames came from others counts as silent.
 const QUIET: u64 = 90;
 
-/// What the preview knows.
+/// The findings of the preview.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Seen {
+pub struct TurnSeen {
     /// Where the camera has been around the subject.
     pub turn: Turn,
     /// Frames that were fused.
@@ -56,7 +56,7 @@ struct Shared {
 #[derive(Default)]
 struct State {
     queue: VecDeque<Frame>,
-    seen: Seen,
+    seen: TurnSeen,
     ends: bool,
     /// The thread has ended; nobody takes frames any more.
     over: bool,
@@ -96,7 +96,7 @@ impl Preview {
     /// Starts the thread.
     ///
     /// # Errors
-    /// What the system says where there are no threads left.
+    /// The system's error where there are no threads left.
     pub fn start(rig: Rig, pace: Pace) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let its = shared.clone();
@@ -127,13 +127,13 @@ impl Preview {
         self.shared.changed.notify_all();
     }
 
-    /// What it knows now.
-    pub fn seen(&self) -> Seen {
+    /// The findings so far.
+    pub fn seen(&self) -> TurnSeen {
         self.shared.lock().seen.clone()
     }
 
     /// Waits until every frame that was handed over has been looked at (devices that can wait), then ends the thread.
-    pub fn finish(mut self) -> Seen {
+    pub fn finish(mut self) -> TurnSeen {
         if self.pace == Pace::OnDemand {
             let mut state = self.shared.lock();
             while !state.queue.is_empty() && !state.over {
@@ -241,14 +241,14 @@ fn follow(rig: &Rig, shared: &Shared) {
             kept = fuse(fuser, std::mem::take(&mut kept), &mut sensors);
             next_look = FIRST_LOOK;
         }
-        if kept.len() > MOST_KEPT {
-            // Every other one tells the same about who moves.
+        if kept.len() > MAX_KEPT {
+            // Every other one shows the same about who moves.
             let mut keep = false;
             kept.retain(|_| {
                 keep = !keep;
                 keep
             });
-            next_look = MOST_KEPT;
+            next_look = MAX_KEPT;
         }
     }
 }

@@ -14,8 +14,8 @@ use std::{
 use toile_capture::{CaptureError, Frame, Recorder, RecorderOptions, Source};
 
 use crate::{
-    LiveError,
-    preview::{Preview, Seen},
+    DeviceError, LiveError,
+    preview::{Preview, TurnSeen},
     status::{Counter, Status, disk_left},
     stop::{Pace, Stop},
 };
@@ -26,9 +26,9 @@ const ROOM: usize = 300;
 /// How often the line is written, and the disk asked.
 const LINE_EVERY: Duration = Duration::from_millis(250);
 /// Broken frames in a row that end the take.
-const MOST_BROKEN: u32 = 30;
+const MAX_BROKEN: u32 = 30;
 
-/// What was recorded.
+/// The recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
     /// Frames in the file.
@@ -41,10 +41,10 @@ pub struct Recorded {
     pub unpaired: u64,
     /// Frames that came but could not be read.
     pub broken: Vec<String>,
-    /// What ended the device, where it did not end as it should (unplugged).
+    /// The error that ended the device, where it did not end as it should (unplugged).
     pub failed: Option<String>,
-    /// What the preview saw.
-    pub seen: Seen,
+    /// The findings of the preview.
+    pub seen: TurnSeen,
 }
 
 /// Records from `source` to `path` until `stop`, the source's end, or `interrupted`.
@@ -56,7 +56,7 @@ pub fn record(
     path: &Path,
     (stop, pace): (Stop, Pace),
     interrupted: &AtomicBool,
-    tell: &mut dyn FnMut(&Status),
+    report: &mut dyn FnMut(&Status),
 ) -> Result<Recorded, LiveError> {
     let recorder = Recorder::create(path, source.rig(), RecorderOptions::default())?;
     let preview = Preview::start(source.rig().clone(), pace).map_err(|e| CaptureError::io(path, e))?;
@@ -70,8 +70,8 @@ pub fn record(
             .spawn_scoped(scope, move || run_camera(&mut *source, &sender, ends))
             .map_err(|e| CaptureError::io(path, e))?;
         let mut take =
-            Take { recorder, preview, stop, counter: Counter::default(), has_color, times_ns: BTreeMap::new() };
-        let ended = take.follow(&frames, path, interrupted, tell);
+            Recording { recorder, preview, stop, counter: Counter::default(), has_color, times_ns: BTreeMap::new() };
+        let ended = take.follow(&frames, path, interrupted, report);
         // Also after an error the camera must not wait for anybody.
         ends.store(true, Ordering::Release);
         while frames.recv().is_ok() {}
@@ -93,7 +93,7 @@ fn run_camera(source: &mut dyn Source, sender: &SyncSender<Result<Frame, Capture
     }
 }
 
-struct Take {
+struct Recording {
     recorder: Recorder,
     preview: Preview,
     stop: Stop,
@@ -110,14 +110,14 @@ struct Ended {
     failed: Option<String>,
 }
 
-impl Take {
+impl Recording {
     /// Writes frames until it is time to stop.
     fn follow(
         &mut self,
         frames: &Receiver<Result<Frame, CaptureError>>,
         path: &Path,
         interrupted: &AtomicBool,
-        tell: &mut dyn FnMut(&Status),
+        report: &mut dyn FnMut(&Status),
     ) -> Result<Ended, LiveError> {
         let (mut ended, mut said, mut in_a_row) = (Ended::default(), None, 0);
         while !interrupted.load(Ordering::Acquire) {
@@ -133,7 +133,7 @@ impl Take {
                 Ok(Err(error)) => {
                     in_a_row += 1;
                     ended.broken.push(error.to_string());
-                    if in_a_row >= MOST_BROKEN {
+                    if in_a_row >= MAX_BROKEN {
                         return Ok(ended);
                     }
                 }
@@ -143,7 +143,7 @@ impl Take {
             let seen = self.preview.seen();
             if said.is_none_or(|then: Instant| then.elapsed() >= LINE_EVERY) {
                 said = Some(Instant::now());
-                tell(&self.status(path, &seen));
+                report(&self.status(path, &seen));
             }
             if self.share(&seen) >= 1.0 {
                 return Ok(ended);
@@ -152,7 +152,7 @@ impl Take {
         Ok(ended)
     }
 
-    fn status(&self, path: &Path, seen: &Seen) -> Status {
+    fn status(&self, path: &Path, seen: &TurnSeen) -> Status {
         let [frames_per_second, megabytes_per_second] = self.counter.rates();
         Status {
             frames: self.counter.frames,
@@ -177,7 +177,7 @@ impl Take {
     }
 
     /// How much of the take is done; 1 when it is time to stop.
-    fn share(&self, seen: &Seen) -> f64 {
+    fn share(&self, seen: &TurnSeen) -> f64 {
         match self.stop {
             Stop::After(seconds) => {
                 let passed = self.times_ns.values().map(|(first, last)| last.saturating_sub(*first) as f64 * 1e-9);
@@ -191,11 +191,11 @@ impl Take {
 
     fn finish(self, ended: Ended) -> Result<Recorded, LiveError> {
         if self.counter.frames == 0 {
-            let why = ended.failed.or(ended.broken.into_iter().next()).unwrap_or("no frame came".into());
+            let why = ended.failed.or(ended.broken.into_iter().next()).unwrap_or("the camera sent no frame".into());
             let part = self.recorder.part_path().to_path_buf();
             drop(self.recorder);
             drop(std::fs::remove_file(part));
-            return Err(LiveError::Device(why));
+            return Err(DeviceError::NoFrames(why).into());
         }
         let summary = self.recorder.finish()?;
         let seen = self.preview.finish();

@@ -54,7 +54,7 @@ impl RigFile {
     /// [`LiveError`] names the file and what is wrong with it.
     pub fn read(path: &Path) -> Result<Self, LiveError> {
         let text = std::fs::read_to_string(path).map_err(|e| CaptureError::io(path, e))?;
-        let sensors = parse(&text).map_err(|e| LiveError::Settings(format!("{}: {e}", path.display())))?;
+        let sensors = parse(&text).map_err(|e| LiveError::settings(path, e))?;
         Ok(Self { path: path.to_path_buf(), sensors })
     }
 
@@ -64,13 +64,13 @@ impl RigFile {
         if is_live { Pace::Live } else { Pace::OnDemand }
     }
 
-    /// What its recordings lost before they came here, a sentence each.
+    /// Losses of its recordings before they came here, a sentence each.
     ///
     /// # Errors
     /// [`LiveError`] where one cannot be read at all.
     pub fn damage(&self) -> Result<Vec<String>, LiveError> {
-        let told = self.sensors.iter().map(|placed| placed.device.damage());
-        told.filter_map(Result::transpose).collect()
+        let reported = self.sensors.iter().map(|placed| placed.device.damage());
+        reported.filter_map(Result::transpose).collect()
     }
 
     /// Opens all sensors for a take of `subject` that will be `layer`.
@@ -87,14 +87,14 @@ impl RigFile {
             sources.push((source, placed.name.clone(), placed.rig_from_depth));
         }
         let together = Together::new(sources, self.pace());
-        Ok(Box::new(together.map_err(|reason| LiveError::Settings(format!("{}: {reason}", self.path.display())))?))
+        Ok(Box::new(together.map_err(|reason| LiveError::settings(&self.path, reason))?))
     }
 }
 
 fn parse(text: &str) -> Result<Vec<Placed>, String> {
     let file: Text = toml::from_str(text).map_err(|e| e.message().to_string())?;
     if file.sensor.is_empty() {
-        return Err("it names no [[sensor]]".into());
+        return Err("[[sensor]] is missing: it must name at least one".into());
     }
     let placed = |sensor: SensorText| {
         if !sensor.position.iter().chain(&sensor.rotation).all(|v| v.is_finite()) {
@@ -133,7 +133,7 @@ mod tests {
     fn what_is_wrong_is_named() {
         for (text, words) in [
             ("", "sensor"),
-            ("sensor = []", "no [[sensor]]"),
+            ("sensor = []", "[[sensor]] is missing"),
             ("[[sensor]]\ndevice = \"kinect9\"", "choose of"),
             ("[[sensor]]\ndevice = \"kinect1\"\nplace = 1", "place"),
             ("[[sensor]]\ndevice = \"kinect1\"\ncolor = \"webcam:0\"", "needs a calibration"),

@@ -9,7 +9,7 @@ use std::{
 
 use toile_capture::Frame;
 
-use crate::{preview::Seen, stop::Stop};
+use crate::{preview::TurnSeen, stop::Stop};
 
 /// Rates are of the last two seconds.
 const WINDOW: Duration = Duration::from_secs(2);
@@ -65,8 +65,8 @@ pub struct Status {
     pub megabytes_per_second: f64,
     /// Bytes that may still be written; `None` where the system does not say.
     pub disk_left: Option<u64>,
-    /// What the preview saw.
-    pub seen: Seen,
+    /// The findings of the preview.
+    pub seen: TurnSeen,
     /// When the take ends.
     pub stop: Stop,
     /// How much of the take is done, 0 to 1.
@@ -107,8 +107,8 @@ fn disk(left: u64, rate: f64) -> String {
 /// Bytes that may still be written beside `path`; `None` where the system does not say.
 pub fn disk_left(path: &Path) -> Option<u64> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let told = rustix::fs::statvfs(folder).ok()?;
-    Some(told.f_bavail.saturating_mul(told.f_frsize))
+    let reported = rustix::fs::statvfs(folder).ok()?;
+    Some(reported.f_bavail.saturating_mul(reported.f_frsize))
 }
 
 #[cfg(test)]
@@ -145,7 +145,7 @@ mod tests {
             frames_per_second: fps,
             megabytes_per_second: rate,
             disk_left: Some(5_000_000_000),
-            seen: Seen::default(),
+            seen: TurnSeen::default(),
             stop: Stop::AfterOneTurn,
             share: 0.0,
         };
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_disk_of_a_folder_is_told() {
+    fn the_disk_of_a_folder_is_reported() {
         assert!(disk_left(&std::env::temp_dir().join("x")).is_some_and(|left| left > 0));
         assert!(disk_left(Path::new("no/such/folder/x")).is_none());
     }

@@ -208,16 +208,16 @@ mod tests {
     #[test]
     fn recordings_are_merged_in_the_order_of_host_time() {
         let mut both = together(Pace::OnDemand, false);
-        let told: Vec<_> =
+        let reported: Vec<_> =
             std::iter::from_fn(|| both.next_frame().unwrap()).map(|f| (f.index, f.sensor, f.host_time_ns)).collect();
-        assert_eq!(told, [(0, 0, 0), (1, 1, 10), (2, 1, 20), (3, 0, 30), (4, 0, 60), (5, 1, 70), (6, 1, 80)]);
+        assert_eq!(reported, [(0, 0, 0), (1, 1, 10), (2, 1, 20), (3, 0, 30), (4, 0, 60), (5, 1, 70), (6, 1, 80)]);
         let names: Vec<_> =
             both.rig().sensors.iter().map(|s| (s.name.as_str(), s.rig_from_depth.translation.x)).collect();
         assert_eq!(names, [("left", 0.0), ("kinect", 1.0)]);
     }
 
     #[test]
-    fn of_cameras_one_that_fails_is_told_and_the_other_goes_on() {
+    fn of_cameras_one_that_fails_is_reported_and_the_other_goes_on() {
         let mut both = together(Pace::Live, true);
         let (mut frames, mut errors) = ([0, 0], 0);
         loop {

@@ -135,7 +135,7 @@ mod tests {
         (0..=15).for_each(|i| other.push(&at(f64::from(i) * 4.0)));
         assert!((other.angle().to_degrees() - 240.0).abs() < 1e-6);
         assert_eq!(other.unseen(), ["back right"]);
-        // Back and forth is no turn.
+        // Back and forth is not a turn.
         (0..=45).rev().for_each(|i| turn.push(&at(f64::from(i) * 4.0)));
         assert!(turn.angle() < 1e-9);
     }

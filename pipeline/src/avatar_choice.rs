@@ -1,4 +1,4 @@
-//! What a subject's avatar was made with: kept in `SUBJECT/edits/avatar.json`, with its motion beside, so that the next
+//! The choices that a subject's avatar was made with: kept in `SUBJECT/edits/avatar.json`, with its motion beside, so that the next
 //! run makes the same one.
 
 use std::{
@@ -18,20 +18,20 @@ use crate::{
     options::{HiddenChoice, MotionChoice, Options},
 };
 
-/// What an avatar is made with. The default is the shipped walk, VRM's joint names, and whole layers.
+/// The choices for an avatar. The default is the shipped walk, VRM's joint names, and whole layers.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AvatarChoice {
     /// File name of the motion in `SUBJECT/edits/motion/`; without, the shipped walk.
     pub motion: Option<String>,
-    /// What the joints are called in `avatar.glb`.
+    /// The names of the joints in `avatar.glb`.
     pub joint_names: JointNaming,
     /// How what clothes hide is left out; without, nothing is.
     pub hidden: Option<CullSettings>,
 }
 
 impl AvatarChoice {
-    /// What the avatar at `folders` was made with last.
+    /// The choices that the avatar at `folders` was made with last.
     ///
     /// # Errors
     /// [`PipelineError`] where the file cannot be read.
@@ -40,7 +40,7 @@ impl AvatarChoice {
         if path.exists() { json::read(&path) } else { Ok(Self::default()) }
     }
 
-    /// What it is made with now: as before where `options` say nothing. A motion is copied into the subject's folder.
+    /// Its choices now: as before where `options` say nothing. A motion is copied into the subject's folder.
     ///
     /// # Errors
     /// [`PipelineError`] where a file cannot be read or written.
@@ -69,7 +69,7 @@ impl AvatarChoice {
         self.motion.as_ref().map(|name| folders.motions().join(name))
     }
 
-    /// What differs from an avatar that nobody chose anything for, in words.
+    /// Differences from an avatar that nobody chose anything for, in words.
     pub fn in_words(&self) -> Vec<String> {
         let motion = self
             .motion

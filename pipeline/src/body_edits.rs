@@ -1,4 +1,4 @@
-//! What is said by hand about the body: the content of `SUBJECT/edits/body.json`.
+//! Statements by hand about the body: the content of `SUBJECT/edits/body.json`.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use toile_fitting::{FitSettings, HandLandmarks};
 
 use crate::{PipelineError, json};
 
-/// What is said by hand about the body.
+/// Statements by hand about the body.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BodyEdits {

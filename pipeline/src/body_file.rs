@@ -13,7 +13,7 @@ use toile_geometry::ply;
 
 use crate::{PipelineError, folders::Folders, json};
 
-/// What later steps and the page need of `body.json`.
+/// The part of `body.json` that later steps and the page need.
 #[derive(Debug, Clone, Deserialize)]
 pub struct BodyFile {
     /// Standing straight, metres.

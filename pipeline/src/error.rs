@@ -1,4 +1,4 @@
-//! What can go wrong in a run; every message is one sentence that says what, where and what to do.
+//! Errors of a run; every message is one sentence that names the problem, its place and the remedy.
 
 use std::path::{Path, PathBuf};
 
@@ -20,13 +20,11 @@ pub enum PipelineError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: std::io::Error,
     },
     /// The disk has no room left.
-    #[error(
-        "{path}: no room left on the disk; free some space and run the same command again (nothing half-written is left)"
-    )]
+    #[error("{path}: the disk is full; free some space and run the same command again (nothing half-written is left)")]
     DiskFull {
         /// The file that did not fit.
         path: PathBuf,
@@ -38,7 +36,7 @@ pub enum PipelineError {
         path: PathBuf,
         /// The field in it, where there is one: `stages.fuse.result.frames_seen`.
         field: Option<String>,
-        /// What is wrong and what to do.
+        /// The problem and the remedy.
         reason: String,
     },
     /// A stage could not give an answer.
@@ -46,7 +44,7 @@ pub enum PipelineError {
     Stage {
         /// The take, scan or file that the stage worked on.
         path: PathBuf,
-        /// What the stage said.
+        /// The stage's error.
         source: Cause,
     },
     /// Another run holds the subject.
@@ -60,9 +58,9 @@ pub enum PipelineError {
     NoLayer {
         /// The subject's folder.
         path: PathBuf,
-        /// What was asked for.
+        /// The request.
         layer: String,
-        /// What there is.
+        /// The names that exist.
         has: String,
     },
     /// A value cannot be written as JSON.
@@ -117,7 +115,7 @@ impl PipelineError {
         Self::Stage { path: path.to_path_buf(), source: source.into() }
     }
 
-    /// What the pipeline itself refuses at `path`.
+    /// A refusal of the pipeline itself at `path`.
     pub fn refused(path: &Path, reason: impl Into<String>) -> Self {
         Self::stage(path, Cause::Refused(reason.into()))
     }
@@ -167,7 +165,7 @@ impl PipelineError {
     /// The field of that file, where it is known.
     pub fn field_name(&self) -> Option<&str> {
         match self {
-            Self::Format { field, .. } => field.as_deref(),
+            Self::Format { field, .. } | Self::Capture(CaptureError::Format { field, .. }) => field.as_deref(),
             _ => None,
         }
     }

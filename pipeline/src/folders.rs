@@ -30,7 +30,7 @@ impl Folders {
         self.root.join("build")
     }
 
-    /// What was built from one take, such as `01-trousers`.
+    /// The results built from one take, such as `01-trousers`.
     pub fn layer(&self, layer: &str) -> PathBuf {
         self.build().join(layer)
     }
@@ -55,7 +55,7 @@ impl Folders {
         self.root.join("edits").join(format!("{layer}.json"))
     }
 
-    /// What the avatar was made with; there need not be any.
+    /// The file of the choices that the avatar was made with; there need not be any.
     pub fn avatar_choice(&self) -> PathBuf {
         self.root.join("edits").join("avatar.json")
     }

@@ -1,4 +1,4 @@
-//! What is known of a garment: its type and how thick its cloth is.
+//! Facts about a garment: its type and the thickness of its cloth.
 
 use serde::Serialize;
 use toile_garments::{ExtractionReport, GarmentType, cloth_thickness};
@@ -35,7 +35,7 @@ impl Garment {
     }
 }
 
-/// What `subject.toml` says of the thickness of the cloth of take `number`'s garment, metres.
+/// Thickness of the cloth of take `number`'s garment, as `subject.toml` gives it, metres.
 ///
 /// # Errors
 /// [`PipelineError`] where no cloth is that thick.

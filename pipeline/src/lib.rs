@@ -4,9 +4,9 @@
 //! reads what they need from a subject's folder, hands it over, and writes what they give back, whole or not at all:
 //!
 //! - [`process()`]: all stages in their order, up to a [`Goal`];
-//! - [`steps`]: the stages, each a [`Step`]: what it reads and writes, what decides its result, and the one call into the
+//! - [`steps`]: the stages, each a [`Step`]: the files it reads and writes, the settings that decide its result, and the one call into the
 //!   stage's crate;
-//! - [`Record`]: what `report.json` says of a step; a step is skipped while its record holds;
+//! - [`Record`]: the content of `report.json` for a step; a step is skipped while its record holds;
 //! - [`Settings`]: of all stages, from `toile.toml`;
 //! - [`Run`]: one run over one subject; [`Folders`]: where its files lie;
 //! - [`Observer`]: the receiver of a run's progress.
@@ -53,4 +53,4 @@ pub use resume::run_step;
 pub use run::Run;
 pub use settings::Settings;
 pub use step::{Product, Remarks, Step};
-pub use summary::{Decided, Measured, Summary, Take};
+pub use summary::{Decided, Measured, Summary, TakeSummary};

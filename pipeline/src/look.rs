@@ -1,4 +1,4 @@
-//! What the avatar's layers do in the poses that it will be seen in: those of its motion, and the T-pose of VRM.
+//! The avatar's layers in the poses that it will be seen in: those of its motion, and the T-pose of VRM.
 
 use serde::{Deserialize, Serialize};
 use toile_avatar::Avatar;
@@ -11,7 +11,7 @@ pub const POSES: usize = 8;
 /// two triangles each.
 const SPOT_PAIRS: usize = 20;
 
-/// What was seen of each layer but the innermost, which has nothing below it.
+/// The findings of each layer but the innermost, which has nothing below it.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Look {
     /// Name of the motion.
@@ -48,7 +48,7 @@ pub fn at(avatar: &Avatar, motion: &Motion) -> Look {
 }
 
 impl Look {
-    /// What is to be looked at, a sentence each.
+    /// Places to look at, a sentence each.
     pub fn warnings(&self) -> Vec<String> {
         let moving = format!("the motion `{}`", self.motion);
         let both = self.in_motion.iter().zip(&self.in_t_pose);

@@ -13,7 +13,7 @@ use crate::PipelineError;
 pub struct Opened {
     /// Its frames.
     pub source: Box<dyn Source>,
-    /// What a torn or damaged recording lost, a sentence each.
+    /// Losses of a torn or damaged recording, a sentence each.
     pub lost: Vec<String>,
     /// Frames that never arrived while recording.
     pub dropped: u64,

@@ -1,4 +1,4 @@
-//! What may be chosen for a run.
+//! The options of a run.
 
 use std::path::PathBuf;
 
@@ -23,14 +23,14 @@ pub enum Goal {
     Report,
 }
 
-/// What may be chosen for a whole run.
+/// The options of a whole run.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// How the avatar moves.
     pub motion: MotionChoice,
-    /// What the joints are called in `avatar.glb`; without, as before.
+    /// The names of the joints in `avatar.glb`; without, as before.
     pub joint_names: Option<JointNaming>,
-    /// What the avatar leaves out.
+    /// The hidden triangles that the avatar leaves out.
     pub hidden: HiddenChoice,
     /// Stop after this layer; without, all of them.
     pub last_layer: Option<String>,
@@ -52,7 +52,7 @@ pub enum MotionChoice {
     File(PathBuf),
 }
 
-/// What the avatar leaves out of what clothes hide.
+/// The hidden triangles that the avatar leaves out.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum HiddenChoice {
     /// As when it was made last; nothing the first time.
@@ -60,16 +60,16 @@ pub enum HiddenChoice {
     AsBefore,
     /// Nothing: every layer is whole.
     Whole,
-    /// What no one can see.
+    /// The triangles that no one can see.
     LeftOut(CullSettings),
 }
 
 /// Changes the settings of the fusion.
 #[derive(Debug, Clone, Default)]
 pub struct FusionChoice {
-    /// What of the frames is fused.
+    /// The frames that are fused.
     pub volume: Option<toile_fusion::Volume>,
-    /// What is assumed about the motion.
+    /// The assumption about the motion.
     pub prior: Option<toile_fusion::Prior>,
     /// Edge of a voxel, metres.
     pub voxel_size: Option<f64>,

@@ -14,7 +14,7 @@ use crate::{
     settings, stale,
     step::Step,
     steps::{cut::Cut, export::Export, fit::Fit, fuse::Fuse, page::Page, pose::PoseUnder, stack::Stack},
-    summary::{Measured, Summary, Take},
+    summary::{Measured, Summary, TakeSummary},
 };
 
 /// Takes the subject at `root` to `goal`, doing whatever is missing.
@@ -31,7 +31,7 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
     let mut summary = Summary { layers: vec!["body".into()], ..Summary::default() };
     for layer in &run.layers {
         let fuse = summary.hear(run.step(&Fuse::of_layer(&run, layer))?);
-        summary.decided.takes.push(Take { layer: layer.clone(), fuse, pose: None, cut: None });
+        summary.decided.takes.push(TakeSummary { layer: layer.clone(), fuse, pose: None, cut: None });
     }
     if goal == Goal::Scans {
         summary.files = run.layers.iter().map(|l| run.folders.scan(l)).collect();

@@ -11,7 +11,7 @@ use toile_capture::files::atomic_write;
 
 use crate::{PipelineError, hash, json};
 
-/// What `report.json` says of one step, with the typed report `R`.
+/// The content of `report.json` for one step, with the typed report `R`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record<R> {
     /// Version of the step.
@@ -24,13 +24,13 @@ pub struct Record<R> {
     pub settings: Value,
     /// SHA-256 of every output by its path.
     pub outputs: BTreeMap<String, String>,
-    /// What was decided.
+    /// The decisions.
     pub result: R,
-    /// What to worry about.
+    /// Warnings.
     pub warnings: Vec<String>,
     /// Recorded data that was lost.
     pub lost: Vec<String>,
-    /// What failed although the run went on.
+    /// Failures after which the run went on.
     pub failures: Vec<String>,
 }
 

@@ -22,7 +22,7 @@ const PROGRAM: &str = concat!("toile ", env!("CARGO_PKG_VERSION"));
 /// files and the record are written, and that is given. Paths in the record are relative to `root`.
 ///
 /// # Errors
-/// What the work says, or a file that cannot be read or written.
+/// The error of the work, or a file that cannot be read or written.
 pub fn run_step<S: Step>(step: &S, root: &Path, observer: &dyn Observer) -> Result<Record<S::Report>, PipelineError> {
     let (label, started) = (step.label(), Instant::now());
     let inputs = hashes(root, &step.inputs()?)?;

@@ -19,6 +19,8 @@ pub struct Run<'a> {
     /// The subject, or `None` for a single recording or scan.
     /// Locked: nothing else writes into the subject's folder meanwhile.
     subject: Option<LockedSubject>,
+    /// The type of the garment that each take added, where it is known; empty for a single file.
+    garment_types: Vec<Option<GarmentType>>,
     name: String,
 }
 
@@ -34,7 +36,7 @@ impl<'a> Run<'a> {
         observer: &'a dyn Observer,
     ) -> Result<Self, PipelineError> {
         let subject = LockedSubject::open(root)?;
-        check_types(root, subject.layers())?;
+        let garment_types = garment_types(root, subject.layers())?;
         let mut layers: Vec<String> = subject.layers().iter().map(Layer::label).collect();
         if layers.is_empty() {
             let reason =
@@ -49,24 +51,32 @@ impl<'a> Run<'a> {
             layers.truncate(count);
         }
         let name = subject.name().to_string();
-        Ok(Self { folders: Folders::new(root), layers, settings, observer, subject: Some(subject), name })
+        Ok(Self {
+            folders: Folders::new(root),
+            layers,
+            settings,
+            observer,
+            subject: Some(subject),
+            garment_types,
+            name,
+        })
     }
 
     /// Over a single file; records name paths relative to `root`.
     pub fn single(root: &Path, name: &str, settings: Settings, observer: &'a dyn Observer) -> Self {
         let (folders, name) = (Folders::new(root), name.to_string());
-        Self { folders, layers: Vec::new(), settings, observer, subject: None, name }
+        Self { folders, layers: Vec::new(), settings, observer, subject: None, garment_types: Vec::new(), name }
     }
 
     /// Runs a step where its record does not hold any more.
     ///
     /// # Errors
-    /// What the step says, or a file that cannot be read or written.
+    /// The error of the step, or a file that cannot be read or written.
     pub fn step<S: Step>(&self, step: &S) -> Result<Record<S::Report>, PipelineError> {
         run_step(step, &self.folders.root, self.observer)
     }
 
-    /// What a step is called while it runs.
+    /// The name of a step while it runs.
     pub fn label(&self, layer: &str, stage: &str) -> String {
         if self.name == layer { format!("{layer}: {stage}") } else { format!("{} {layer}: {stage}", self.name) }
     }
@@ -76,7 +86,7 @@ impl<'a> Run<'a> {
         self.layers.first().map_or("00-body", String::as_str)
     }
 
-    /// What the subject is called.
+    /// The name of the subject.
     pub fn title(&self) -> &str {
         &self.name
     }
@@ -90,9 +100,7 @@ impl<'a> Run<'a> {
 
     /// The type of the garment that take `n` added, where it is known.
     pub fn garment_type(&self, n: usize) -> Option<GarmentType> {
-        let layer = self.subject.as_ref()?.layers().get(n).filter(|_| n > 0)?;
-        let by_name = || toile_character::GarmentType::from_layer_name(&layer.name).map(GarmentType::name);
-        layer.garment.as_deref().or_else(by_name)?.parse().ok()
+        self.garment_types.get(n).copied().flatten()
     }
 
     /// Thickness of the cloth of the garment that take `n` added, millimetres, where `subject.toml` gives it.
@@ -101,14 +109,14 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Checks the types of all garments, so that a wrong one is found before any work is done.
-fn check_types(root: &Path, layers: &[Layer]) -> Result<(), PipelineError> {
-    for layer in layers {
-        let parsed =
-            layer.garment.as_deref().map_or(Ok(()), |text| text.parse::<toile_character::GarmentType>().map(drop));
-        parsed.map_err(|reason| {
+/// The types of all garments, by `subject.toml` or else by the layer's name; the body has none. A wrong one is found
+/// before any work is done.
+fn garment_types(root: &Path, layers: &[Layer]) -> Result<Vec<Option<GarmentType>>, PipelineError> {
+    let of_layer = |(n, layer): (usize, &Layer)| {
+        let stated = layer.garment.as_deref().map(str::parse::<GarmentType>).transpose().map_err(|reason| {
             PipelineError::format(&root.join("subject.toml"), format!("layer {}: {reason}", layer.label()))
         })?;
-    }
-    Ok(())
+        Ok(stated.or_else(|| GarmentType::from_layer_name(&layer.name)).filter(|_| n > 0))
+    };
+    layers.iter().enumerate().map(of_layer).collect()
 }

@@ -1,4 +1,4 @@
-//! What a stage on disk is.
+//! A stage on disk.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::PipelineError;
 /// A step is a plain value that knows its run and its take. [`crate::run_step`] looks whether its record still holds, and
 /// calls [`Step::work`] where it does not.
 pub trait Step {
-    /// What the step decides: residuals, counts, verdicts. Later steps and the page read it. It must be the same for
+    /// The decisions of the step: residuals, counts, verdicts. Later steps and the page read it. It must be the same for
     /// any number of threads.
     type Report: Serialize + DeserializeOwned;
 
@@ -25,7 +25,7 @@ pub trait Step {
     /// True where the outputs contain times and so differ from run to run: the record then has no hash of them.
     const OUTPUTS_VARY: bool = false;
 
-    /// What the step is called while it runs.
+    /// The name of the step while it runs.
     fn label(&self) -> String;
 
     /// Folder of the step's `report.json` and `timings.json`.
@@ -58,26 +58,26 @@ pub trait Step {
     fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<Self::Report>, PipelineError>;
 }
 
-/// What a step made.
+/// The results of a step.
 pub struct Product<R> {
     /// The files, one for each of the step's outputs.
     pub files: Vec<(PathBuf, Vec<u8>)>,
-    /// What was decided.
+    /// The decisions.
     pub report: R,
-    /// What is to be said of it.
+    /// Remarks about it.
     pub remarks: Remarks,
     /// Milliseconds by step and the like: a JSON object, or null.
     pub timings: Value,
 }
 
-/// What is to be said of a result, a sentence each.
+/// Remarks about a result, a sentence each.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Remarks {
-    /// What to worry about.
+    /// Warnings.
     pub warnings: Vec<String>,
     /// Recorded data that was lost.
     pub lost: Vec<String>,
-    /// What failed although the run goes on.
+    /// Failures after which the run goes on.
     pub failures: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What a run made, and what is to be said of it.
+//! The results of a run, and remarks about them.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::{
     steps::{export::Exported, pose::PoseReport, stack::Stacked},
 };
 
-/// What a run made and what is to be said of it.
+/// The results of a run, and remarks about them.
 #[derive(Debug, Default)]
 pub struct Summary {
     /// The layers, body first.
@@ -23,11 +23,11 @@ pub struct Summary {
     pub measurements: Option<Measured>,
     /// The files that were asked for.
     pub files: Vec<std::path::PathBuf>,
-    /// What the steps decided.
+    /// The decisions of the steps.
     pub decided: Decided,
-    /// What is to be said of it.
+    /// Remarks about it.
     pub remarks: Remarks,
-    /// What the run did that was not asked for, a sentence each.
+    /// Actions of the run that were not asked for, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -42,11 +42,11 @@ pub struct Measured {
     pub volume_m3: f64,
 }
 
-/// What each step decided, as far as the run went.
+/// The decisions of each step, as far as the run went.
 #[derive(Debug, Default)]
 pub struct Decided {
     /// The takes, in their order.
-    pub takes: Vec<Take>,
+    pub takes: Vec<TakeSummary>,
     /// The body.
     pub body: Option<FitReport>,
     /// All layers together.
@@ -55,9 +55,9 @@ pub struct Decided {
     pub avatar: Option<Exported>,
 }
 
-/// What the steps of one take decided.
+/// The decisions of the steps of one take.
 #[derive(Debug)]
-pub struct Take {
+pub struct TakeSummary {
     /// Folder name of the layer.
     pub layer: String,
     /// The scan.

@@ -20,7 +20,7 @@ pub enum RenderError {
         name: String,
     },
     /// There is nothing to draw or no pixel to draw on.
-    #[error("no picture: {0}")]
+    #[error("the picture cannot be drawn: {0}")]
     Empty(String),
     /// The encoder refused the image.
     #[error("PNG: {0}")]

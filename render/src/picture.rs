@@ -73,7 +73,7 @@ impl<'a> Drawn<'a> {
 /// triangle or the picture has no pixel.
 pub fn picture(drawn: &[Drawn], view: &View, width: u32, height: u32) -> Result<RgbImage, RenderError> {
     if width == 0 || height == 0 || drawn.iter().all(|d| d.mesh.is_empty()) {
-        return Err(RenderError::Empty("no triangle to draw or no pixel to draw on".into()));
+        return Err(RenderError::Empty("it needs at least one triangle to draw and one pixel to draw on".into()));
     }
     let camera = view.camera(drawn.iter().flat_map(|d| used_points(d.mesh)), width, height);
     picture_from(drawn, &camera)

@@ -127,7 +127,7 @@ fn transparent_layers_mix_and_opaque_ones_hide() {
 }
 
 #[test]
-fn bad_input_is_told() {
+fn bad_input_is_refused_by_name() {
     let mut mesh = bumpy_ball(0.5);
     let missing = Drawn { mesh: &mesh, paint: Paint::Attribute("strain".into(), (0.0, 1.0)), opacity: 1.0 };
     let error = picture(&[missing], &View::front(), 10, 10).unwrap_err().to_string();

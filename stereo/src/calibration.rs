@@ -82,8 +82,8 @@ pub fn calibration_of(storage: &FileStorage, metres_per_unit: f64) -> Result<Ste
 fn matrix<'a>(storage: &'a FileStorage, name: &str, what: &str) -> Result<&'a Matrix, String> {
     storage.matrices.get(name).ok_or_else(|| {
         let names: Vec<&str> = storage.matrices.keys().map(String::as_str).collect();
-        let has = if names.is_empty() { "no matrix at all".into() } else { names.join(", ") };
-        format!("no matrix {name} ({what}); there is {has}. Give both files where stereo_calib wrote two")
+        let has = if names.is_empty() { "none".into() } else { names.join(", ") };
+        format!("matrix {name} ({what}) is missing; the file has {has}. Give both files where stereo_calib wrote two")
     })
 }
 
@@ -207,7 +207,7 @@ mod tests {
         let both = read_calibration(&[&inner, &outer], 0.001).unwrap();
         assert_eq!(both, read(&text).unwrap());
         let error = read_calibration(&[&inner], 0.001).unwrap_err().to_string();
-        assert!(error.contains("intrinsics.yml") && error.contains("no matrix R"), "{error}");
+        assert!(error.contains("intrinsics.yml") && error.contains("matrix R "), "{error}");
         let error = read_calibration(&[folder.join("none.yml")], 0.001).unwrap_err().to_string();
         assert!(error.contains("none.yml"), "{error}");
         std::fs::remove_dir_all(&folder).unwrap();
@@ -216,8 +216,8 @@ mod tests {
     #[test]
     fn matrices_that_cannot_be_are_named() {
         for (from, to, word) in [
-            ("M2: !!", "N2: !!", "no matrix M2"),
-            ("D1: !!", "E1: !!", "no matrix D1"),
+            ("M2: !!", "N2: !!", "matrix M2 "),
+            ("D1: !!", "E1: !!", "matrix D1 "),
             ("[ 5e2, 0e0, 3.2e2", "[ -5e2, 0e0, 3.2e2", "M1"),
             ("[ 5e2, 0e0, 3.2e2", "[ 5e2, 3e0, 3.2e2", "skew"),
             ("[ 1e0, 0e0, 0e0, 0e0, 1e0", "[ 1e0, 0e0, 0e0, 0e0, 2e0", "not a rotation"),

@@ -36,7 +36,7 @@ pub struct DepthFromPair {
     settings: DepthSettings,
 }
 
-/// What a pair of images shows.
+/// The depth of a pair of images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairDepth {
     /// Depth of the rectified left camera.

@@ -1,4 +1,4 @@
-//! What can go wrong between two images and depth.
+//! Errors between two images and depth.
 
 /// Errors of the stereo crate.
 #[derive(Debug, thiserror::Error)]
@@ -21,7 +21,7 @@ pub enum StereoError {
     Calibration {
         /// The file or files.
         place: String,
-        /// What is wrong, where, and what to do.
+        /// The problem, its place, and the remedy.
         reason: String,
     },
     /// The two cameras cannot be rectified.

@@ -16,7 +16,7 @@ pub struct Matrix {
     pub data: Vec<f64>,
 }
 
-/// What a file holds at its top level.
+/// The top level of a file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FileStorage {
     /// Matrices by name.
@@ -66,7 +66,7 @@ fn key_and_value(line: &str) -> Option<(&str, &str)> {
 fn matrix(body: &[&str]) -> Result<Matrix, String> {
     let field = |name: &str| {
         let found = body.iter().filter_map(|l| key_and_value(l)).find(|(k, _)| *k == name);
-        found.map(|(_, value)| value).ok_or_else(|| format!("no `{name}`"))
+        found.map(|(_, value)| value).ok_or_else(|| format!("`{name}` is missing"))
     };
     let size = |name: &str| field(name)?.parse::<usize>().map_err(|e| format!("`{name}`: {e}"));
     let (rows, cols) = (size("rows")?, size("cols")?);
@@ -84,7 +84,7 @@ fn matrix(body: &[&str]) -> Result<Matrix, String> {
 
 /// The numbers of `data: [ ... ]`.
 fn numbers(body: &str) -> Result<Vec<f64>, String> {
-    let list = body.split_once("data:").map(|(_, rest)| rest.trim_start()).ok_or("no `data`")?;
+    let list = body.split_once("data:").map(|(_, rest)| rest.trim_start()).ok_or("`data` is missing")?;
     let list = list.strip_prefix('[').and_then(|l| l.split_once(']')).ok_or("`data` has no [ ... ]")?.0;
     let finite = |word: &str| match word.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
@@ -114,7 +114,7 @@ mod tests {
             ("rows: 3", "rows: 4", "needs 4 numbers"),
             ("rows: 3", "rows: x", "`rows`"),
             ("rows: 3", "rows: 99999999999", "too large"),
-            ("   cols: 1\n", "", "no `cols`"),
+            ("   cols: 1\n", "", "`cols` is missing"),
             ("0.,", "zero,", "`zero`"),
             ("0.,", ".Nan,", "`.Nan`"),
             ("3.5 ]", "3.5", "no [ ... ]"),

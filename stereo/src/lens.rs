@@ -44,7 +44,7 @@ impl Lens {
         ray
     }
 
-    /// What a ray is multiplied with, and what is added to it.
+    /// The factor of a ray, and the offset that is added to it.
     fn bend(&self, ray: Vector2<f64>) -> (f64, Vector2<f64>) {
         let [k1, k2, p1, p2, k3, k4, k5, k6] = self.distortion;
         let (x, y) = (ray.x, ray.y);

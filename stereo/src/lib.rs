@@ -48,6 +48,6 @@ pub use error::StereoError;
 pub use image::{GrayImage, luma};
 pub use lens::Lens;
 pub use matcher::{DisparityMap, match_pair};
-pub use rectification::{Rectification, View, rectify};
+pub use rectification::{Rectification, RectifiedView, rectify};
 pub use remap::Remap;
 pub use settings::MatchSettings;

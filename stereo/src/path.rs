@@ -2,7 +2,7 @@
 
 use toile_geometry::lanes::bytes::{LANES, Lanes};
 
-/// What a vector of path costs has before its first and after its last disparity: a sentinel that never wins.
+/// The cost before the first and after the last disparity of a vector of path costs: a sentinel that never wins.
 pub(crate) const SENTINELS: usize = 2;
 
 /// Penalties for a change of disparity by one, and by more.

@@ -13,14 +13,14 @@ pub struct Rectification {
     /// Distance of the two views, metres.
     pub baseline: f64,
     /// How the rectified left view looks into the left camera.
-    pub left: View,
+    pub left: RectifiedView,
     /// How the rectified right view looks into the right camera.
-    pub right: View,
+    pub right: RectifiedView,
 }
 
 /// One rectified view.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
+pub struct RectifiedView {
     /// The camera it takes its pixels from.
     pub lens: Lens,
     /// Turns a ray of that camera into the rectified frame.
@@ -56,7 +56,9 @@ pub fn rectify(
     };
     let made = made.map_err(StereoError::Rectification)?;
     if !(made.camera.is_valid() && made.baseline.is_finite()) {
-        return Err(StereoError::Rectification("its numbers lead to no finite view; calibrate again".into()));
+        return Err(StereoError::Rectification(
+            "the view that follows from its numbers is not finite; calibrate again".into(),
+        ));
     }
     Ok(made)
 }
@@ -69,8 +71,8 @@ fn from_given(c: &StereoCalibration, given: &GivenRectification, (w, h): (u32, u
     Ok(Rectification {
         camera: PinholeCamera::ideal(w, h, p1[(0, 0)], p1[(1, 1)], p1[(0, 2)], p1[(1, 2)]),
         baseline,
-        left: View { lens: c.left, rectified_from_camera: left },
-        right: View { lens: c.right, rectified_from_camera: right },
+        left: RectifiedView { lens: c.left, rectified_from_camera: left },
+        right: RectifiedView { lens: c.right, rectified_from_camera: right },
     })
 }
 
@@ -82,8 +84,8 @@ fn bouguet(c: &StereoCalibration, size: (u32, u32), alpha: Option<f64>) -> Resul
     let axis = t.cross(&Vector3::new(t.x.signum(), 0.0, 0.0));
     let angle = (t.x.abs() / t.norm()).min(1.0).acos();
     let level = axis.try_normalize(0.0).map_or(Rotation3::identity(), |a| Rotation3::from_scaled_axis(a * angle));
-    let left = View { lens: c.left, rectified_from_camera: (level * half.inverse()).into_inner() };
-    let right = View { lens: c.right, rectified_from_camera: (level * half).into_inner() };
+    let left = RectifiedView { lens: c.left, rectified_from_camera: (level * half.inverse()).into_inner() };
+    let right = RectifiedView { lens: c.right, rectified_from_camera: (level * half).into_inner() };
     let camera = common_camera([&left, &right], size, alpha);
     Ok(Rectification { camera, baseline: (level * t).x.abs(), left, right })
 }
@@ -103,11 +105,11 @@ fn check_baseline(t: Vector3<f64>) -> Result<(), String> {
 }
 
 /// The camera that both views share.
-fn common_camera(views: [&View; 2], (w, h): (u32, u32), alpha: Option<f64>) -> PinholeCamera {
+fn common_camera(views: [&RectifiedView; 2], (w, h): (u32, u32), alpha: Option<f64>) -> PinholeCamera {
     let f = f64::midpoint(views[0].lens.fy, views[1].lens.fy);
     let (right, bottom) = (f64::from(w) - 1.0, f64::from(h) - 1.0);
     let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
-    let mean = |view: &View| corners.iter().map(|&(u, v)| view.ray(u, v)).sum::<Vector2<f64>>() / 4.0;
+    let mean = |view: &RectifiedView| corners.iter().map(|&(u, v)| view.ray(u, v)).sum::<Vector2<f64>>() / 4.0;
     let middle = (mean(views[0]) + mean(views[1])) / 2.0 * f;
     let (cx, cy) = (right / 2.0 - middle.x, bottom / 2.0 - middle.y);
     let zoom = alpha.map_or(1.0, |alpha| zoom(views, (w, h), (cx / f, cy / f), f, alpha.clamp(0.0, 1.0)));
@@ -116,7 +118,7 @@ fn common_camera(views: [&View; 2], (w, h): (u32, u32), alpha: Option<f64>) -> P
 
 /// By how much to enlarge the view: between the rectangle that every ray of the border reaches beyond (`alpha` 0) and
 /// the one that contains all rays (1).
-fn zoom(views: [&View; 2], (w, h): (u32, u32), (left, top): (f64, f64), f: f64, alpha: f64) -> f64 {
+fn zoom(views: [&RectifiedView; 2], (w, h): (u32, u32), (left, top): (f64, f64), f: f64, alpha: f64) -> f64 {
     let (right, bottom) = ((f64::from(w) - 1.0) / f - left, (f64::from(h) - 1.0) / f - top);
     let (mut inner, mut outer) = (0.0f64, f64::INFINITY);
     for view in views {
@@ -128,7 +130,7 @@ fn zoom(views: [&View; 2], (w, h): (u32, u32), (left, top): (f64, f64), f: f64, 
     inner * (1.0 - alpha) + outer * alpha
 }
 
-impl View {
+impl RectifiedView {
     /// The camera's pixel that the rectified ray (x, y, 1) comes from; `None` where the ray runs backwards.
     pub fn source(&self, ray: Vector2<f64>) -> Option<Point2<f64>> {
         let in_camera = self.rectified_from_camera.transpose() * Vector3::new(ray.x, ray.y, 1.0);

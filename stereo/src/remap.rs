@@ -5,19 +5,19 @@ use rayon::prelude::*;
 use toile_capture::RgbImage;
 use toile_geometry::camera::PinholeCamera;
 
-use crate::View;
+use crate::RectifiedView;
 
 /// For every pixel of a rectified view, where in the camera's image it comes from. Made once, used for every frame.
 #[derive(Debug, Clone)]
 pub struct Remap {
     width: u32,
     height: u32,
-    places: Vec<Place>,
+    places: Vec<Corners>,
 }
 
 /// Four pixels of the source and their weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
+struct Corners {
     /// Upper left one; [`OUTSIDE`] where the camera does not see.
     index: u32,
     /// Weight of the right ones, of the lower ones: 0 to 256.
@@ -32,12 +32,13 @@ const ONE: u32 = 256;
 
 impl Remap {
     /// The map of `view` through the rectified `camera`; source and view have the same size.
-    pub fn new(view: &View, camera: &PinholeCamera) -> Self {
+    pub fn new(view: &RectifiedView, camera: &PinholeCamera) -> Self {
         let (width, height) = (camera.width, camera.height);
         let place = |i: u32| {
             let (u, v) = (f64::from(i % width), f64::from(i / width));
             let ray = Vector2::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);
-            view.source(ray).map_or(Place { index: OUTSIDE, right: 0, lower: 0 }, |p| place(p.x, p.y, width, height))
+            view.source(ray)
+                .map_or(Corners { index: OUTSIDE, right: 0, lower: 0 }, |p| corners(p.x, p.y, width, height))
         };
         Self { width, height, places: (0..width * height).into_par_iter().map(place).collect() }
     }
@@ -59,21 +60,21 @@ impl Remap {
     }
 }
 
-fn place(x: f64, y: f64, width: u32, height: u32) -> Place {
+fn corners(x: f64, y: f64, width: u32, height: u32) -> Corners {
     // Half a pixel beyond the outer centres still belongs to the image.
     let inside = (-0.5..=f64::from(width) - 0.5).contains(&x) && (-0.5..=f64::from(height) - 0.5).contains(&y);
     if !inside || width < 2 || height < 2 {
-        return Place { index: OUTSIDE, right: 0, lower: 0 };
+        return Corners { index: OUTSIDE, right: 0, lower: 0 };
     }
     let axis = |at: f64, size: u32| {
         let first = at.floor().clamp(0.0, f64::from(size - 2));
         (first as u32, ((at - first).clamp(0.0, 1.0) * f64::from(ONE)).round() as u16)
     };
     let ((u, right), (v, lower)) = (axis(x, width), axis(y, height));
-    Place { index: v * width + u, right, lower }
+    Corners { index: v * width + u, right, lower }
 }
 
-impl Place {
+impl Corners {
     fn sample(self, pixels: &[[u8; 3]], stride: usize) -> [u8; 3] {
         if self.index == OUTSIDE {
             return [0; 3];
@@ -98,9 +99,9 @@ mod tests {
     use super::*;
     use crate::Lens;
 
-    fn view(cx: f64) -> View {
+    fn view(cx: f64) -> RectifiedView {
         let lens = Lens { fx: 10.0, fy: 10.0, cx, cy: 1.5, distortion: [0.0; 8] };
-        View { lens, rectified_from_camera: Matrix3::identity() }
+        RectifiedView { lens, rectified_from_camera: Matrix3::identity() }
     }
 
     fn ramp() -> RgbImage {

@@ -7,7 +7,7 @@ use toile_geometry::lanes::bytes::{LANES, Lanes};
 pub(crate) struct Winner {
     /// Index of the disparity.
     pub index: u16,
-    /// What to add to it, −0.5 to 0.5 pixels.
+    /// The offset to add to it, −0.5 to 0.5 pixels.
     pub fraction: f32,
     /// True where all but its two neighbours cost clearly more, and both neighbours were searched.
     pub is_unique: bool,

@@ -1,17 +1,15 @@
 //! Rectification beside OpenCV's. The golden file was written by `tests/peers/stereo.py --golden`.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use std::path::Path;
-
 use nalgebra::Vector2;
 use serde_json::Value;
-use toile_stereo::{Rectification, View, calibration_of, file_storage, rectify};
+use toile_stereo::{Rectification, RectifiedView, calibration_of, file_storage, rectify};
 
 /// How far a pixel may lie from OpenCV's.
 const TOLERANCE: f64 = 1e-3;
 
 /// Where a pixel of the rectified view comes from.
-fn source(made: &Rectification, view: &View, u: f64, v: f64) -> (f64, f64) {
+fn source(made: &Rectification, view: &RectifiedView, u: f64, v: f64) -> (f64, f64) {
     let c = &made.camera;
     let p = view.source(Vector2::new((u - c.cx) / c.fx, (v - c.cy) / c.fy)).expect("the ray runs forward");
     (p.x, p.y)
@@ -35,15 +33,11 @@ fn worst(made: &Rectification, golden: &Value) -> f64 {
 #[test]
 fn rectified_pixels_come_from_where_opencv_takes_them() {
     let golden: Value = serde_json::from_str(include_str!("golden/opencv.json")).expect("the golden file is JSON");
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real/stereo");
     for case in golden["cases"].as_array().expect("there are cases") {
         let mut text = case["text"].as_str().expect("a text").to_string();
         if let Some(file) = case["intrinsics"].as_str() {
-            let Ok(intrinsics) = std::fs::read_to_string(data.join(file)) else {
-                println!("skipped: {file} is not in ../shared/data");
-                continue;
-            };
-            text += &intrinsics;
+            let Some(path) = toile_outside::data(&format!("real/stereo/{file}")) else { continue };
+            text += &std::fs::read_to_string(path).expect("the intrinsics are text");
         }
         let storage = file_storage::parse(&text).expect("OpenCV's own file is read");
         let calibration = calibration_of(&storage, 1.0).expect("it is whole");

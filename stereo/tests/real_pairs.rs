@@ -1,19 +1,10 @@
 //! Real pairs with true disparity (Middlebury 2003 and 2006), where the private data is at hand.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use toile_capture::RgbImage;
 use toile_stereo::{GrayImage, MatchSettings, luma, match_pair};
-
-fn data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real/stereo");
-    if !folder.is_dir() {
-        println!("skipped: the pairs of ../shared/data/real/stereo are not here");
-        return None;
-    }
-    Some(folder)
-}
 
 /// A binary PGM or PPM of 8 bits, as grey.
 fn read_pnm(path: &Path) -> GrayImage {
@@ -51,7 +42,7 @@ fn score(found: &[f32], truth: &[f32]) -> (f64, f64) {
 
 #[test]
 fn cones_and_aloe_are_matched_densely_and_rightly() {
-    let Some(data) = data() else { return };
+    let Some(data) = toile_outside::data("real/stereo") else { return };
     let (cones, aloe) = (data.join("middlebury_cones"), data.join("opencv_aloe"));
     let quarter: Vec<f32> = read_pnm(&cones.join("disp2.pgm")).pixels.iter().map(|&d| f32::from(d) / 4.0).collect();
     let whole: Vec<f32> = read_image(&aloe.join("aloeGT.png")).pixels.iter().map(|&d| f32::from(d)).collect();

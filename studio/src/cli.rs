@@ -1,4 +1,4 @@
-//! The command line: what can be asked, and in which words.
+//! The command line: the commands and their options.
 
 use clap::{Parser, Subcommand};
 
@@ -21,10 +21,10 @@ Without its own `--json`, a command prints for people; progress and warnings go 
 #[derive(Debug, Parser)]
 #[command(name = "toile", version, after_help = AFTER, arg_required_else_help = true)]
 pub struct Cli {
-    /// What every command takes.
+    /// The options of every command.
     #[command(flatten)]
     pub globals: Globals,
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -36,7 +36,7 @@ pub enum Command {
     Import(commands::import::Import),
     /// Record a take from a camera, and see how much of the subject was seen
     Capture(commands::capture::Capture),
-    /// Show what is in a recording, a folder or a subject, and whether it is healthy
+    /// Show the contents of a recording, a folder or a subject, and whether it is healthy
     Inspect(commands::inspect::Inspect),
     /// Fuse takes into scans
     Fuse(commands::fuse::Fuse),
@@ -58,7 +58,7 @@ pub enum Command {
     Settings(commands::settings::Settings),
     /// Make a synthetic subject with its truth: for training, tests and trials of a rig
     Synthesize(commands::synthesize::Synthesize),
-    /// List the cameras that are plugged in, and what is wrong with them
+    /// List the cameras that are plugged in, and their problems
     Devices(commands::devices::Devices),
     /// Print completions for a shell
     Completions(commands::completions::Completions),

@@ -1,4 +1,4 @@
-//! What can go wrong in the program; every message is one sentence that says what, where and what to do.
+//! Errors of the program; every message is one sentence that names the problem, its place and the remedy.
 
 use std::path::Path;
 
@@ -13,9 +13,12 @@ pub enum StudioError {
     /// The command line asks for something that makes no sense.
     #[error("{0}")]
     Usage(String),
-    /// A device, or the permission to use it.
-    #[error("{0}")]
-    Device(String),
+    /// Ctrl-C cannot be watched.
+    #[error("Ctrl-C cannot be watched: {0}")]
+    Signal(std::io::Error),
+    /// A device, its settings, or the permission to use it.
+    #[error(transparent)]
+    Live(LiveError),
     /// From a stage or its files.
     #[error(transparent)]
     Pipeline(PipelineError),
@@ -27,7 +30,7 @@ impl StudioError {
         Self::Pipeline(PipelineError::io(path, source))
     }
 
-    /// What the program itself refuses at `path`.
+    /// A refusal of the program itself at `path`.
     pub fn refused(path: &Path, reason: impl Into<String>) -> Self {
         Self::Pipeline(PipelineError::refused(path, reason))
     }
@@ -41,7 +44,8 @@ impl StudioError {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Usage(_) => "usage",
-            Self::Device(_) => "device",
+            Self::Signal(_) => "device",
+            Self::Live(error) => error.kind(),
             Self::Pipeline(error) => error.kind(),
         }
     }
@@ -50,7 +54,8 @@ impl StudioError {
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::Pipeline(error) => error.file(),
-            Self::Usage(_) | Self::Device(_) => None,
+            Self::Live(error) => error.file(),
+            Self::Usage(_) | Self::Signal(_) => None,
         }
     }
 
@@ -58,7 +63,7 @@ impl StudioError {
     pub fn field(&self) -> Option<&str> {
         match self {
             Self::Pipeline(error) => error.field_name(),
-            Self::Usage(_) | Self::Device(_) => None,
+            Self::Usage(_) | Self::Signal(_) | Self::Live(_) => None,
         }
     }
 }
@@ -75,9 +80,9 @@ impl From<PipelineError> for StudioError {
 impl From<LiveError> for StudioError {
     fn from(error: LiveError) -> Self {
         match error {
-            LiveError::Settings(reason) => Self::Usage(reason),
-            LiveError::Device(reason) => Self::Device(reason),
+            LiveError::Usage(reason) => Self::Usage(reason),
             LiveError::Capture(error) => error.into(),
+            other => Self::Live(other),
         }
     }
 }

@@ -3,7 +3,7 @@
 //! No algorithm lives here. [`toile_pipeline`] takes a subject's folder from recordings to an avatar; [`toile_live`]
 //! records; this crate says what can be asked, asks it, and prints the answer:
 //!
-//! - `cli`, `commands`: what can be asked, and in which words;
+//! - `cli`, `commands`: the commands and their options;
 //! - `run`: one run of the program, words in, answer out;
 //! - [`Outcome`]: how a command ended; `main` alone turns that into an exit code.
 //!

@@ -5,18 +5,18 @@ use toile_capture::printable_path;
 
 use crate::StudioError;
 
-/// What a command found or did.
+/// The answer of a command.
 #[derive(Debug, Default)]
 pub struct Answer {
     /// For people, on standard output; may have several lines.
     pub text: String,
     /// For machines.
     pub results: Value,
-    /// What to worry about, a sentence each.
+    /// Warnings, a sentence each.
     pub warnings: Vec<String>,
     /// Recorded data that was lost, a sentence each.
     pub lost: Vec<String>,
-    /// What failed although the command went on, a sentence each.
+    /// Failures after which the command went on, a sentence each.
     pub failures: Vec<String>,
 }
 
@@ -38,7 +38,7 @@ impl Outcome {
     /// How `answer` counts.
     pub fn of(answer: &Result<Answer, StudioError>) -> Self {
         match answer {
-            Err(StudioError::Usage(_)) => Self::Usage,
+            Err(error) if error.kind() == "usage" => Self::Usage,
             Err(_) => Self::Failed,
             Ok(answer) if !answer.failures.is_empty() => Self::Failed,
             Ok(answer) if !answer.lost.is_empty() => Self::Lost,
@@ -70,16 +70,16 @@ pub fn document(command: &str, answer: &Result<Answer, StudioError>) -> Value {
     document
 }
 
-/// What `--json` says of an error: its kind and message, and the file and field that it concerns where they are known.
+/// The JSON of an error: its kind and message, and the file and field that it concerns where they are known.
 pub fn error_document(error: &StudioError) -> Value {
-    let mut told = json!({ "kind": error.kind(), "message": error.to_string() });
+    let mut reported = json!({ "kind": error.kind(), "message": error.to_string() });
     if let Some(file) = error.file() {
-        told["file"] = printable_path(file).into();
+        reported["file"] = printable_path(file).into();
     }
     if let Some(field) = error.field() {
-        told["field"] = field.into();
+        reported["field"] = field.into();
     }
-    told
+    reported
 }
 
 #[cfg(test)]
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_warning_is_no_loss_and_a_failure_outweighs_a_loss() {
+    fn a_warning_is_not_a_loss_and_a_failure_outweighs_a_loss() {
         let of = |answer| Outcome::of(&Ok(answer));
         let some = || vec!["a sentence".to_string()];
         assert_eq!(of(Answer { warnings: some(), ..Answer::default() }), Outcome::Done);

@@ -15,11 +15,11 @@ const LINE_EVERY: Duration = Duration::from_secs(5);
 
 /// Progress of one run. Costs are expected seconds; only their proportions matter.
 pub struct Progress {
-    view: View,
+    display: Display,
     state: Mutex<State>,
 }
 
-enum View {
+enum Display {
     Nothing,
     Bar(ProgressBar),
     Lines,
@@ -41,10 +41,10 @@ struct State {
 impl Progress {
     /// Shows nothing where `quiet`, a bar where standard error is a terminal, lines elsewhere.
     pub fn new(quiet: bool) -> Self {
-        let view = match (quiet, std::io::stderr().is_terminal()) {
-            (true, _) => View::Nothing,
-            (false, true) => View::Bar(bar()),
-            (false, false) => View::Lines,
+        let display = match (quiet, std::io::stderr().is_terminal()) {
+            (true, _) => Display::Nothing,
+            (false, true) => Display::Bar(bar()),
+            (false, false) => Display::Lines,
         };
         let now = Instant::now();
         let state = State {
@@ -57,7 +57,7 @@ impl Progress {
             started: now,
             said: now,
         };
-        Self { view, state: Mutex::new(state) }
+        Self { display, state: Mutex::new(state) }
     }
 
     /// Shows how the take that is being recorded stands.
@@ -68,23 +68,23 @@ impl Progress {
         self.show(&mut state, false);
     }
 
-    /// What the steps remarked, once.
+    /// The remarks of the steps, each once.
     pub fn take_remarks(&self) -> Vec<String> {
         std::mem::take(&mut self.state().remarks)
     }
 
     /// Says a line without disturbing the bar.
     pub fn say(&self, line: &str) {
-        match &self.view {
-            View::Nothing => {}
-            View::Bar(bar) => bar.suspend(|| eprintln!("{line}")),
-            View::Lines => eprintln!("{line}"),
+        match &self.display {
+            Display::Nothing => {}
+            Display::Bar(bar) => bar.suspend(|| eprintln!("{line}")),
+            Display::Lines => eprintln!("{line}"),
         }
     }
 
     /// Takes the bar away.
     pub fn finish(&self) {
-        if let View::Bar(bar) = &self.view {
+        if let Display::Bar(bar) = &self.display {
             bar.finish_and_clear();
         }
     }
@@ -97,13 +97,13 @@ impl Progress {
         let whole = state.done + state.ahead;
         let done = state.done + state.fraction * state.step;
         let left = time_left(state.started.elapsed().as_secs_f64(), done, whole);
-        match &self.view {
-            View::Nothing => {}
-            View::Bar(bar) => {
+        match &self.display {
+            Display::Nothing => {}
+            Display::Bar(bar) => {
                 bar.set_position((1000.0 * done / whole.max(1e-9)) as u64);
                 bar.set_message(format!("{}  {left}", state.label));
             }
-            View::Lines => {
+            Display::Lines => {
                 if begins || state.said.elapsed() >= LINE_EVERY {
                     state.said = Instant::now();
                     let percent = (100.0 * done / whole.max(1e-9)) as u32;

@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// More threads than any machine that this runs on has processors.
-const MOST_THREADS: usize = 1024;
+const MAX_THREADS: usize = 1024;
 
 /// Parses the command line, does what it says, and prints the answer.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> Outcome {
@@ -99,8 +99,8 @@ fn not_understood(error: &clap::Error, json: bool) -> Outcome {
 }
 
 fn start_threads(threads: usize) -> Result<(), StudioError> {
-    if threads > MOST_THREADS {
-        return Err(StudioError::Usage(format!("--threads {threads} is more than {MOST_THREADS}")));
+    if threads > MAX_THREADS {
+        return Err(StudioError::Usage(format!("--threads {threads} is more than {MAX_THREADS}")));
     }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -150,7 +150,7 @@ fn print(command: &str, answer: &Result<Answer, StudioError>, globals: &Globals)
 
 fn say(document: &serde_json::Value) {
     let bytes = json::pretty(document).unwrap_or_default();
-    // A reader that went away is no failure of ours.
+    // A reader that went away is not a failure of ours.
     drop(io::stdout().write_all(&bytes));
 }
 

@@ -1,4 +1,4 @@
-//! What every command is given.
+//! Given to every command.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::progress::Progress;
 
-/// What every command takes.
+/// The options of every command.
 #[derive(Debug, Clone, Args)]
 pub struct Globals {
     /// Processor threads to use (0: as many as the machine has). The result is the same for any number
@@ -23,7 +23,7 @@ pub struct Globals {
     pub verbose: u8,
 }
 
-/// What every command is given.
+/// Given to every command.
 pub struct Session {
     /// The options that every command takes.
     pub globals: Globals,

@@ -29,7 +29,7 @@ fn missing_frames_are_counted_and_the_rest_is_kept() {
 }
 
 #[test]
-fn unequal_counts_of_depth_and_colour_are_told() {
+fn unequal_counts_of_depth_and_colour_are_reported() {
     let recording = Recording::new(6, 4);
     let answer = exits(3, toile().args(recording.import("body")));
     let lost = answer["lost"].to_string();
@@ -44,6 +44,8 @@ fn a_wrong_camera_field_is_named() {
         let answer = exits(1, toile().args(recording.import("body")));
         let message = answer["error"]["message"].as_str().unwrap();
         assert!(message.contains("camera.json") && message.contains(field), "{field} = {value}: {message}");
+        assert_eq!(answer["error"]["field"], field, "{answer}");
+        assert!(answer["error"]["file"].as_str().unwrap().ends_with("camera.json"), "{answer}");
         assert!(recording.nothing_was_written(), "{field} = {value}");
     }
 }
@@ -88,7 +90,7 @@ fn an_empty_folder_says_what_is_expected() {
 }
 
 #[test]
-fn an_empty_mcap_and_a_foreign_one_are_told_apart_from_ours() {
+fn an_empty_mcap_and_a_foreign_one_are_distinguished_from_ours() {
     let dir = tempfile::tempdir().unwrap();
     let magic = b"\x89MCAP0\r\n";
     for (name, bytes, says) in [

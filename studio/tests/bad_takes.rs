@@ -1,4 +1,4 @@
-//! Takes that are no good session: what is said, the exit code, and what is on disk afterwards.
+//! Takes that do not make a good session: messages, the exit code, and the files on disk afterwards.
 
 #![allow(clippy::unwrap_used)] // all of it is test code
 
@@ -59,7 +59,7 @@ fn a_turn_that_is_not_full_is_a_warning() {
     exits(0, toile().arg("synthesize").arg("--out").arg(&subject).args(words));
     let answer = exits(0, toile().arg("fuse").arg(&subject));
     let warnings = answer["warnings"].to_string();
-    assert!(warnings.contains("00-body") && warnings.contains("no full turn"), "{answer}");
+    assert!(warnings.contains("00-body") && warnings.contains("the turn is not full"), "{answer}");
     assert!(subject.join("build/00-body/scan.ply").is_file());
 }
 
@@ -78,7 +78,7 @@ fn a_garment_take_that_shows_no_new_garment() {
     assert!(page.contains("no new garment"), "the report says so too");
 }
 
-/// A subject whose takes are copies of `takes` of another one, as layers of these names and without told types.
+/// A subject whose takes are copies of `takes` of another one, as layers of these names and without given types.
 fn session_of(from: &Path, to: &Path, takes: &[(&str, &str)]) {
     fs::create_dir_all(to.join("takes")).unwrap();
     let mut toml = String::from("name = \"eva\"\n");

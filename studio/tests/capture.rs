@@ -41,13 +41,13 @@ fn a_take_ends_after_its_seconds_and_a_retake_of_its_replay_is_the_same() {
     first
         .args(["capture", "--layer", "body", "--device", "synthetic:5", "--seconds", "0.9", "--subject"])
         .arg(&subject);
-    let told = exits(0, &mut first);
+    let reported = exits(0, &mut first);
     let take = subject.join("takes/00-body.mcap");
     let recorded = frames(&take);
     // Five a second: stopped at the first frame after 0.9 s, at most a queue later.
     assert!((5..10).contains(&recorded.len()), "{}", recorded.len());
-    assert_eq!(told["results"]["frames"], recorded.len());
-    assert!(told["warnings"][0].as_str().unwrap().contains("of the turn"));
+    assert_eq!(reported["results"]["frames"], recorded.len());
+    assert!(reported["warnings"][0].as_str().unwrap().contains("of the turn"));
     let mut again = toile();
     let copy = dir.path().join("copy.mcap");
     fs::copy(&take, &copy).unwrap();
@@ -68,8 +68,8 @@ fn a_damaged_recording_is_recorded_again_as_far_as_it_goes_and_that_is_said() {
     let (subject, device) = (dir.path().join("olga"), format!("replay:{}", path.display()));
     let mut again = toile();
     again.args(["capture", "--layer", "body", "--device", &device, "--subject"]).arg(&subject);
-    let told = exits(3, &mut again);
-    assert!(told["lost"][0].as_str().unwrap().contains("torn.mcap"), "{told}");
+    let reported = exits(3, &mut again);
+    assert!(reported["lost"][0].as_str().unwrap().contains("torn.mcap"), "{reported}");
     assert!(!frames(&subject.join("takes/00-body.mcap")).is_empty());
 }
 
@@ -99,8 +99,8 @@ fn a_camera_that_is_not_there_leaves_no_subject_and_a_sentence() {
     let subject = dir.path().join("olga");
     let mut command = toile();
     command.args(["capture", "--layer", "body", "--device", "kinect1:NONE", "--subject"]).arg(&subject);
-    let told = exits(1, &mut command);
-    let message = told["error"]["message"].as_str().unwrap();
+    let reported = exits(1, &mut command);
+    let message = reported["error"]["message"].as_str().unwrap();
     assert!(message.contains("not plugged in") || message.contains("/dev/bus/usb"), "{message}");
     assert!(!subject.exists());
     let mut wrong = toile();
@@ -128,8 +128,8 @@ fn the_sensors_of_a_rig_file_record_together() {
     let anna = dir.path().join("anna");
     let mut both = toile();
     both.args(["capture", "--layer", "body", "--rig"]).arg(&rig).arg("--subject").arg(&anna);
-    let told = exits(0, &mut both);
-    assert_eq!(told["results"]["frames"], 2 * recorded.len());
+    let reported = exits(0, &mut both);
+    assert_eq!(reported["results"]["frames"], 2 * recorded.len());
     let take = anna.join("takes/00-body.mcap");
     let sensors = Replay::open(&take).unwrap().rig().sensors.clone();
     let places: Vec<_> = sensors.iter().map(|s| (s.name.as_str(), s.rig_from_depth.translation.z)).collect();

@@ -29,7 +29,7 @@ fn fuse(path: &Path, poses: &Path, out: &Path, threads: &str) -> Command {
 }
 
 /// The stage's record and timings.
-fn told(out: &Path) -> [Value; 2] {
+fn reported(out: &Path) -> [Value; 2] {
     ["report.json", "timings.json"].map(|name| serde_json::from_slice(&fs::read(out.join(name)).unwrap()).unwrap())
 }
 
@@ -54,7 +54,7 @@ fn a_folder_and_its_recording_give_the_same_scan_for_any_number_of_threads() {
     let trajectory = String::from_utf8(file(&outs[0], "trajectory.tum")).unwrap();
     let shift = |line: &str| line.split(' ').nth(1).unwrap().parse::<f64>().unwrap();
     assert_eq!(trajectory.lines().map(shift).collect::<Vec<_>>(), [0.0, 0.001, 0.002, 0.003, 0.004, 0.005]);
-    let [report, timings] = told(&outs[2]);
+    let [report, timings] = reported(&outs[2]);
     assert_eq!(report["stages"]["fuse"]["result"]["truncation_mm"].as_f64().unwrap().round(), 70.0);
     let (fuse, step) = (&timings["fuse"], &timings["fuse"]["steps"]["integrate with colour"]);
     assert_eq!((&fuse["threads"], &step["count"]), (&2.into(), &6.into()), "{timings}");
@@ -72,7 +72,7 @@ fn frames_without_a_pose_are_counted_and_said() {
     let out = dir.path().join("scan");
     let answer = exits(0, &mut fuse(&recording.folder(), &poses, &out, "1"));
     assert!(answer["warnings"].to_string().contains("2 of 6 frames have no known pose"), "{answer}");
-    let [report, _] = told(&out);
+    let [report, _] = reported(&out);
     let result = &report["stages"]["fuse"]["result"];
     let left: Vec<u64> = result["dropped"].as_array().unwrap().iter().map(|d| d["index"].as_u64().unwrap()).collect();
     assert_eq!((&result["frames_fused"], left), (&4.into(), vec![2, 3]), "{result}");
@@ -89,7 +89,7 @@ fn a_wrong_pose_file_is_named_with_line_and_reason() {
         ("1.0 0 0 0 0 0 0 2\n", "line 1: the rotation qx qy qz qw has length 2.000"),
         ("soon 0 0 0 0 0 0 1\n", "line 1: `soon` is not a time"),
         ("# nothing\n", "holds no pose"),
-        ("900.0 0 0 0 0 0 0 1\n", "no known pose within 5 ms"),
+        ("900.0 0 0 0 0 0 0 1\n", "a known pose within 5 ms"),
     ];
     for (text, reason) in wrong {
         let poses = write(&recording, text);

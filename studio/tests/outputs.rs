@@ -49,8 +49,8 @@ fn paths_that_are_not_text_are_read_and_written() {
     let dir = tempfile::tempdir().unwrap();
     let odd = dir.path().join(OsStr::from_bytes(b"M\xfcller"));
     let words = ["--garments", "", "--frames", "2", "--clean"];
-    let told = exits(0, toile().arg("synthesize").arg("--out").arg(&odd).args(words));
-    assert!(told["results"]["out"].as_str().unwrap().contains('\u{fffd}'), "{told}");
+    let reported = exits(0, toile().arg("synthesize").arg("--out").arg(&odd).args(words));
+    assert!(reported["results"]["out"].as_str().unwrap().contains('\u{fffd}'), "{reported}");
     exits(0, toile().arg("inspect").arg(&odd));
     let copy = dir.path().join(OsStr::from_bytes(b"\xff"));
     exits(
@@ -58,8 +58,8 @@ fn paths_that_are_not_text_are_read_and_written() {
         toile().arg("import").arg(odd.join("takes/00-body.mcap")).arg("--subject").arg(&copy).args(["--layer", "body"]),
     );
     for command in ["measure", "fit"] {
-        let told = exits(1, toile().arg(command).arg("--scan").arg(odd.join("none.ply")).arg("--out").arg(&copy));
-        assert_eq!(told["error"]["kind"], "io", "{told}");
+        let reported = exits(1, toile().arg(command).arg("--scan").arg(odd.join("none.ply")).arg("--out").arg(&copy));
+        assert_eq!(reported["error"]["kind"], "io", "{reported}");
     }
 }
 
@@ -79,17 +79,17 @@ fn settings_are_printed_as_a_file_and_wrong_ones_are_named() {
     assert!(text.contains("# metres; 0.0005 to 0.05; default 0.004\nvoxel_size = 0.004"), "{text}");
     let file = dir.path().join("toile.toml");
     fs::write(&file, &text).unwrap();
-    let told = exits(0, toile().arg("settings").arg("--settings").arg(&file));
-    assert_eq!(told["results"]["fusion"]["voxel_size"], 0.004);
+    let reported = exits(0, toile().arg("settings").arg("--settings").arg(&file));
+    assert_eq!(reported["results"]["fusion"]["voxel_size"], 0.004);
     fs::write(&file, "[fusion]\nvoxel_sise = 0.004\n").unwrap();
     for words in [vec!["settings"], vec!["process"], vec!["extract"], vec!["measure"], vec!["export"], vec!["fuse"]] {
         let recording = Recording::new(4, 4);
         exits(0, toile().args(recording.import("body")));
-        let told = exits(1, toile().args(&words).arg(recording.subject()).arg("--settings").arg(&file));
-        // Of several subjects each failure is told with its subject.
-        let error = if words == ["process"] { &told["results"][0]["error"] } else { &told["error"] };
-        assert_eq!((&error["kind"], &error["field"]), (&"format".into(), &"fusion.voxel_sise".into()), "{told}");
+        let reported = exits(1, toile().args(&words).arg(recording.subject()).arg("--settings").arg(&file));
+        // Of several subjects each failure is reported with its subject.
+        let error = if words == ["process"] { &reported["results"][0]["error"] } else { &reported["error"] };
+        assert_eq!((&error["kind"], &error["field"]), (&"format".into(), &"fusion.voxel_sise".into()), "{reported}");
         assert!(error["file"].as_str().unwrap().ends_with("toile.toml"));
-        assert!(error["message"].as_str().unwrap().contains("line 2"), "{told}");
+        assert!(error["message"].as_str().unwrap().contains("line 2"), "{reported}");
     }
 }

@@ -99,7 +99,7 @@ fn what_is_said_by_hand_of_a_body_is_heeded() {
 }
 
 #[test]
-fn what_is_no_person_and_what_is_no_mesh_is_refused() {
+fn a_mesh_without_a_person_and_a_file_without_a_mesh_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let corners =
         (0..8).map(|i| [0.9 * (i & 1) as f32, 1.1 * (i >> 1 & 1) as f32, 0.8 * (i >> 2) as f32].into()).collect();

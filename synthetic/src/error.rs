@@ -1,4 +1,4 @@
-//! What can go wrong in the virtual rig.
+//! Errors of the virtual rig.
 
 /// Errors of the synthetic crate.
 #[derive(Debug, thiserror::Error)]
@@ -38,7 +38,7 @@ pub enum SyntheticError {
     Encode {
         /// Index of the frame.
         index: usize,
-        /// What the encoder said.
+        /// The encoder's message.
         reason: String,
     },
 }

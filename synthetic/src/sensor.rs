@@ -1,4 +1,4 @@
-//! What depth cameras make of the true depth.
+//! The depth that cameras measure in place of the true one.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! What to make.
+//! The settings of a virtual session.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub enum Sex {
     Male,
 }
 
-/// What a garment is cut like.
+/// The cut of a garment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[allow(missing_docs)] // the names are the documentation
@@ -129,7 +129,7 @@ pub struct SyntheticSettings {
     pub variety: f64,
     /// Root mean square of smooth bumps on the skin that no body model knows, metres; 0..0.01, default 0.0012.
     pub detail_m: f64,
-    /// What take 1, 2, ... adds; at most five.
+    /// The addition of take 1, 2, ...; at most five.
     pub garments: Vec<GarmentSettings>,
     /// Edge of the cells that cloth is made on, metres; 0.005..0.03, default 0.008.
     pub cell_m: f32,

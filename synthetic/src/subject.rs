@@ -12,11 +12,11 @@ use crate::{
 /// A person with a wardrobe, ready to be recorded.
 #[derive(Debug, Clone)]
 pub struct Subject {
-    /// What it was made from.
+    /// Its settings.
     pub settings: SyntheticSettings,
     /// The person at rest.
     pub person: Person,
-    /// What take 1, 2, ... adds.
+    /// The addition of take 1, 2, ....
     pub garments: Vec<Garment>,
 }
 

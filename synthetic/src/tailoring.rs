@@ -3,10 +3,10 @@
 use nalgebra::{Point3, Vector3};
 use toile_character::Region;
 
-/// What counts as clearly outside or inside a garment's extent, metres.
+/// The distance that counts as clearly outside or inside a garment's extent, metres.
 const FAR: f32 = 0.05;
 
-/// What part of the body a place belongs to, as far as tailoring cares.
+/// The part of the body that a place belongs to, as far as tailoring cares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Limb {
     /// Trunk, legs, neck and head.
@@ -75,7 +75,7 @@ pub struct Tailoring {
     pub(crate) ends: Vec<Plane>,
     /// Around the neck, for tops.
     pub(crate) neckline: Option<Neckline>,
-    /// What a scarf stays within: the middle of the neck's root and a distance from it.
+    /// The limits of a scarf: the middle of the neck's root and a distance from it.
     pub(crate) within: Option<(Point3<f32>, f32)>,
     /// Where the legs end (left and right), if the garment has legs.
     pub(crate) legs: Option<[Plane; 2]>,

@@ -131,12 +131,12 @@ impl Take {
         self.moments[index].subject_from_camera(&self.room_from_camera)
     }
 
-    /// What frame `index` shows: true depth and shaded colour, row by row.
+    /// The picture of frame `index`: true depth and shaded colour, row by row.
     pub fn look(&self, index: usize) -> (TrueImage, Vec<[u8; 3]>) {
         self.look_through(&self.camera(), index)
     }
 
-    /// What frame `index` shows through another lens in the camera's place.
+    /// The picture of frame `index` through another lens in the camera's place.
     pub fn look_through(&self, lens: &PinholeCamera, index: usize) -> (TrueImage, Vec<[u8; 3]>) {
         let moment = &self.moments[index];
         let bent = self.bend.apply(&self.surface.mesh.positions, moment);

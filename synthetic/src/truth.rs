@@ -1,4 +1,4 @@
-//! What is true of a take and of its person, as files (`docs/synthetic.md`).
+//! Facts about a take and its person, as files (`docs/synthetic.md`).
 
 use std::path::Path;
 
@@ -172,7 +172,7 @@ fn sway_text(take: &Take) -> String {
     text
 }
 
-/// What is true of the person: stature, girths, shape, joints at rest, takes, and the settings that it was made from.
+/// Facts about the person: stature, girths, shape, joints at rest, takes, and the settings that it was made from.
 pub fn subject_json(subject: &Subject) -> Value {
     let takes: Vec<String> = (0..subject.take_count()).map(|n| subject.settings.take_name(n)).collect();
     let volume = subject.person.body.mesh.signed_volume() * 1e3;

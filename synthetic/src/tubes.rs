@@ -9,7 +9,7 @@ use crate::{
     tailoring::{Limb, Tailoring},
 };
 
-/// What cloth hangs down from: for each level of the grid the convex hull of everything above it (below `drape_from`).
+/// The support that cloth hangs down from: for each level of the grid the convex hull of everything above it (below `drape_from`).
 pub(crate) struct Tubes {
     hulls: Vec<Vec<Point2<f64>>>,
 }

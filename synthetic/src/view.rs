@@ -1,4 +1,4 @@
-//! What a camera sees of person, disk and room.
+//! Person, disk and room as a camera sees them.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ const DARK: [u8; 3] = [13, 13, 15];
 /// Standard deviation of the colour's grain, steps of 1/255.
 const GRAIN: f32 = 1.5;
 
-/// What stands around the person.
+/// The surroundings of the person.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
     disk: Mesh,
@@ -58,17 +58,17 @@ impl Scene {
             |room_from_thing: Rigid| Camera { lens: *lens, camera_from_world: camera_from_room * room_from_thing };
         let turned = Isometry3::from_parts(Translation3::identity(), turn);
         let mut seen = vec![
-            Seen { raster: rasterize(&bent, &camera(turned)), mesh: person, turn: turn.cast() },
-            Seen { raster: rasterize(&self.disk, &camera(turned)), mesh: &self.disk, turn: turn.cast() },
+            Faces { raster: rasterize(&bent, &camera(turned)), mesh: person, turn: turn.cast() },
+            Faces { raster: rasterize(&self.disk, &camera(turned)), mesh: &self.disk, turn: turn.cast() },
         ];
         if let Some(room) = &self.room {
             let raster = rasterize(room, &camera(Rigid::identity()));
-            seen.push(Seen { raster, mesh: room, turn: UnitQuaternion::identity() });
+            seen.push(Faces { raster, mesh: room, turn: UnitQuaternion::identity() });
         }
         self.compose(&seen, lens, from)
     }
 
-    fn compose(&self, seen: &[Seen], lens: &PinholeCamera, from: &Viewpoint) -> (TrueImage, Vec<[u8; 3]>) {
+    fn compose(&self, seen: &[Faces], lens: &PinholeCamera, from: &Viewpoint) -> (TrueImage, Vec<[u8; 3]>) {
         let rays = lens.rays();
         let room_from_camera = from.room_from_camera.rotation.cast::<f32>();
         let lights = Lights::over_the_shoulder(Vector3::x(), Vector3::y(), Vector3::z());
@@ -103,7 +103,7 @@ struct Pixel {
 }
 
 impl Pixel {
-    fn of(seen: &[Seen], i: usize, ray: &Vector3<f32>, lights: &Lights, grain: f32) -> Self {
+    fn of(seen: &[Faces], i: usize, ray: &Vector3<f32>, lights: &Lights, grain: f32) -> Self {
         let nearest = seen
             .iter()
             .filter(|s| s.raster.depth[i] > 0.0)
@@ -121,14 +121,14 @@ impl Pixel {
 }
 
 /// One rasterised mesh of the scene.
-struct Seen<'a> {
+struct Faces<'a> {
     raster: Raster,
     mesh: &'a Mesh,
     /// Rotation of room from the mesh's frame.
     turn: UnitQuaternion<f32>,
 }
 
-impl Seen<'_> {
+impl Faces<'_> {
     /// Unit normal in the room and linear albedo at a pixel.
     fn surface(&self, pixel: usize) -> Option<(Vector3<f32>, [f32; 3])> {
         let (t, w) = self.raster.hit(pixel)?;

@@ -13,7 +13,7 @@ tensor VoxelBlockGrid, known poses) and small_gicp (frame to model, poses unknow
 said ("skipped: why") and the rest runs. Everybody gets the frames with the subject cut out by the true poses; peers also get them
 without depth edges (50 mm), as Toile drops edges itself. Voxels 4 mm, truncation 16 mm, everything on one processor.
 
-What is printed: CPU milliseconds a frame (process time, median; reading images, cutting, edge filter and extraction are not in it),
+Printed are: CPU milliseconds a frame (process time, median; reading images, cutting, edge filter and extraction are not in it),
 the ratio to Open3D legacy, mean distance of the surface to the truth, and how much of the truth that some frame sees lies within
 5 mm of the surface (Toile's is the finished scan with its filled holes; what stands on the disk is not scored). Toile's times
 come from its timings.json: `integrate` is the volume update alone, `all steps` adds filter, cut and normals. Tracking rows end with
@@ -57,7 +57,7 @@ def environment():
 
 
 def ended(*command, cwd=None):
-    """What a command said last where it failed, else None."""
+    """The last words of a command where it failed, else None."""
     done = subprocess.run([str(c) for c in command], cwd=cwd, capture_output=True, text=True, timeout=900)
     return None if done.returncode == 0 else ((done.stderr + done.stdout).strip() or "failed").splitlines()[-1]
 

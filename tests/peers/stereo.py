@@ -6,7 +6,8 @@
     VENV/bin/python tests/peers/stereo.py --golden   writes stereo/tests/golden/opencv.json again
     VENV/bin/python tests/peers/stereo.py --pictures FOLDER   disparity maps to look at
 
-Pictures come from ../shared/data/real/stereo beside the project; without them it says "skipped". One thread each; times
+Pictures come from the private stereo pairs: real/stereo in the folder that TOILE_OUTSIDE_DATA names. Without them it says
+"skipped", and fails. One thread each; times
 are the user time of the process, so that other work on the machine matters little. "bad 2.0" is the share of the
 answered pixels with known truth that are off by more than 2 pixels, "density" the share of the known ones answered.
 """
@@ -17,7 +18,7 @@ import cv2
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-DATA = ROOT / "../shared/data/real/stereo"
+DATA = pathlib.Path(os.environ.get("TOILE_OUTSIDE_DATA", ROOT / "../shared/data")) / "real/stereo"
 MATCHER = ["cargo", "run", "--quiet", "--release", "-p", "toile-stereo", "--example", "disparity", "--"]
 REPEATS = 12
 
@@ -159,6 +160,6 @@ if __name__ == "__main__":
     arguments.add_argument("--pictures", metavar="FOLDER")
     arguments = arguments.parse_args()
     if not DATA.is_dir():
-        sys.exit("skipped: the pictures of ../shared/data/real/stereo are not here")
+        sys.exit("skipped: the private stereo pairs are missing; TOILE_OUTSIDE_DATA names the folder that holds real/stereo")
     cv2.setNumThreads(1)
     golden() if arguments.golden else table(arguments.pictures)

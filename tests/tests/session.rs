@@ -173,7 +173,10 @@ fn a_stroke_is_kept_heeded_at_each_rebuild_and_forgotten_on_request() {
     let run = |command: &str, more: &[&str]| {
         let output = toile(&[&[command, subject.to_str().unwrap()], more].concat()).output().unwrap();
         assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
     };
+    let avatar = || fs::read(subject.join("avatar.glb")).unwrap();
+    let first = avatar();
     let cut = subject.join("build/01-trousers/cut.ply");
     let before = fs::read(&cut).unwrap();
     // In front, half-way up.
@@ -182,7 +185,9 @@ fn a_stroke_is_kept_heeded_at_each_rebuild_and_forgotten_on_request() {
     let strokes = dir.path().join("strokes.json");
     let stroke = json!({ "mark": "does-not-belong", "points": [[at.x, at.y, at.z]], "radius": 0.02 });
     fs::write(&strokes, json!({ "version": 1, "strokes": [stroke] }).to_string()).unwrap();
-    run("edit", &["trousers", "--strokes", strokes.to_str().unwrap()]);
+    let answer = run("edit", &["trousers", "--strokes", strokes.to_str().unwrap(), "--json"]);
+    assert!(answer.contains("avatar.glb is older than what it is made from"), "{answer}");
+    assert!(avatar() == first, "an edit alone leaves the avatar");
     let edited = fs::read(&cut).unwrap();
     let [old, new] = [&before, &edited].map(|bytes| ply::decode(bytes).unwrap().positions);
     let distance = |p: &Point3<f32>, points: &[Point3<f32>]| points.iter().map(|q| (p - q).norm()).fold(1.0, f32::min);
@@ -193,6 +198,8 @@ fn a_stroke_is_kept_heeded_at_each_rebuild_and_forgotten_on_request() {
     fs::remove_file(&cut).unwrap();
     run("extract", &[]);
     assert!(fs::read(&cut).unwrap() == edited, "heeded at the rebuild");
+    let answer = run("process", &["--json"]);
+    assert!(!answer.contains("avatar.glb is older") && avatar() != first, "processing builds it again: {answer}");
     run("edit", &["trousers", "--clear"]);
     assert!(fs::read(&cut).unwrap() == before && !subject.join("edits/01-trousers.json").exists());
 }
@@ -215,9 +222,9 @@ fn hidden_skin_is_left_out_on_request_and_comes_back() {
         gltf["meshes"].as_array().unwrap().iter().map(count).collect::<Vec<u64>>()
     };
     let all = corners();
-    let told = export(&["--cull-hidden"]);
+    let reported = export(&["--cull-hidden"]);
     let culled = corners();
-    assert!(told.contains("body: ") && told.contains("triangles left out"), "{told}");
+    assert!(reported.contains("body: ") && reported.contains("triangles left out"), "{reported}");
     assert!(0 < culled[0] && culled[0] < all[0], "{culled:?} of {all:?}");
     assert_eq!(culled.last(), all.last(), "the outermost layer is whole");
     assert!(["avatar.glb", "avatar.vrm"].iter().zip(&whole).all(|(name, whole)| read(name).len() < whole.len()));
@@ -280,9 +287,9 @@ fn an_avatar_keeps_what_it_was_made_with() {
     run(&[&["export", path], &words[..]].concat());
     let made = ["avatar.glb", "avatar.vrm"].map(|name| fs::read(subject.join(name)).unwrap());
     fs::remove_file(&motion).unwrap();
-    let told = run(&["process", path, "--json"]);
+    let reported = run(&["process", path, "--json"]);
     assert!(["avatar.glb", "avatar.vrm"].map(|name| fs::read(subject.join(name)).unwrap()) == made);
-    assert!(told["warnings"].to_string().contains("dance.bvh"), "it says what it keeps: {told}");
+    assert!(reported["warnings"].to_string().contains("dance.bvh"), "it says what it keeps: {reported}");
     // All of it can be built again.
     fs::remove_dir_all(subject.join("build/avatar")).unwrap();
     run(&["process", path, "--json"]);
@@ -300,8 +307,8 @@ fn a_record_changed_by_hand_is_noticed_and_built_again() {
     let at = whole.find("\"gap_m\": ").unwrap() + 9;
     fs::write(&path, format!("{}9{}", &whole[..at], &whole[at..])).unwrap();
     let output = toile(&["process", subject.to_str().unwrap(), "--json"]).output().unwrap();
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let reported: Value = serde_json::from_slice(&output.stdout).unwrap();
     let is_said = |w: &Value| w.as_str().is_some_and(|w| w.contains("build/layers/report.json"));
-    assert!(told["warnings"].as_array().unwrap().iter().any(is_said), "{told}");
+    assert!(reported["warnings"].as_array().unwrap().iter().any(is_said), "{reported}");
     assert_eq!(fs::read_to_string(&path).unwrap(), whole);
 }

@@ -20,7 +20,7 @@ while count < 10:
     image = frames.get_depth_frame()
     count += bool(image) and max(image.get_distance(u, 240) for u in range(0, 640, 40)) > 0.3
 pipeline.stop()
-# What the model is calibrated to (drivers/simulated/src/d435/optics.rs).
+# The calibration of the model (drivers/simulated/src/d435/optics.rs).
 near = lambda a, b: abs(a - b) < 1e-3
 assert near(depth.fx, 385.25) and near(depth.ppx, 319.25) and near(depth.ppy, 241.5), depth
 assert near(color.fx, 615.5) and near(color.ppx, 322.75) and near(color.ppy, 236.25), color

@@ -25,14 +25,14 @@ loop_ms() {
     for ((i = 0; i < 20000; i++)); do :; done
     echo $(((${EPOCHREALTIME/./} - from) / 1000))
 }
-# What did not pass: FAIL, or SKIPPED where it came late on a machine so slow that this proves nothing.
+# A check that did not pass: FAIL, or SKIPPED where it came late on a machine so slow that this proves nothing.
 failed() { # status as of `timeout`, why
     local ms=0
     case "$1 $2" in 124* | 137* | *" takes "*) ms=$(loop_ms) ;; esac
     if [ "$ms" -lt $slow_ms ]; then echo "FAIL: $2"; else echo "SKIPPED: too slow a machine, $ms ms for a loop of $slow_ms: $2"; fi
 }
 # A program of ours: PASS with what it said, or FAIL with why.
-tell() { # name, program and words
+report() { # name, program and words
     local name=$1 words
     shift
     echo "== $name, $(cut -d' ' -f1 /proc/uptime) s after the boot"
@@ -58,7 +58,7 @@ gone() { # product id
     wait $server
     until_true is_unplugged "$1"
 }
-# More frames than are checked: a take ends by time, and lost frames are no fault while they are told.
+# More frames than are checked: a take ends by time, and lost frames are not a fault while they are reported.
 seconds_of() { awk "BEGIN { print ($1 + $2) / 30 }"; } # frames, more
 # Our own program records from a model; the host compares the take with what the model sent.
 record() { # name, device, seconds of its clock
@@ -86,8 +86,8 @@ if wanted kinect1; then
     "$bin/toile" devices
     record kinect1 kinect1 "$(seconds_of "$frames" 30)"
     . "$top/tests/wire/fidelity-kinect1.sh"
-    tell "kinect1 first frame" "$bin/examples/wire_kinect1" first
-    tell "kinect1 unplug" "$bin/examples/wire_kinect1" cycles "$cycles"
+    report "kinect1 first frame" "$bin/examples/wire_kinect1" first
+    report "kinect1 unplug" "$bin/examples/wire_kinect1" cycles "$cycles"
 fi
 
 if wanted realsense; then
@@ -96,9 +96,9 @@ if wanted realsense; then
         record realsense-$wire realsense "$(seconds_of "$frames" 30)"
         [ $wire = bulk ] || . "$top/tests/wire/fidelity-d435.sh"
         gone 0b07
-        tell "realsense-$wire first frame" "$bin/examples/wire_realsense" first $wire
+        report "realsense-$wire first frame" "$bin/examples/wire_realsense" first $wire
     done
-    tell "realsense unplug" "$bin/examples/wire_realsense" cycles "$cycles"
+    report "realsense unplug" "$bin/examples/wire_realsense" cycles "$cycles"
 fi
 
 if wanted stereo; then
@@ -113,7 +113,7 @@ if wanted kinect2; then
     serve 02c4 0 "$bin/examples/wire_kinect2" serve "$rig/kinect2-images"
     record kinect2 kinect2 "$(seconds_of "$(value wire_kinect2)" 5)"
     gone 02c4
-    tell "kinect2 unplug" "$bin/examples/wire_kinect2" cycles "$rig/kinect2-images" "$(value wire_kinect2_cycles)"
+    report "kinect2 unplug" "$bin/examples/wire_kinect2" cycles "$rig/kinect2-images" "$(value wire_kinect2_cycles)"
 fi
 
 echo "== end, $(cut -d' ' -f1 /proc/uptime) s after the boot"

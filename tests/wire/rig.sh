@@ -6,7 +6,7 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 rig=$(cd "$here/../.." && pwd)/target/outside/wire
 mkdir -p "$rig/debs" "$rig/root" "$rig/kern"
-# All downloads together may take so many seconds, those of the clients as many more.
+# Limit of all downloads together, seconds; those of the clients may take as long again.
 limit=600
 
 fail() { echo "$1" >&2; exit 1; }
@@ -88,7 +88,7 @@ make_initrd() {
     rm -r "$tree"
 }
 
-# What was cut short has no mark, and is done again.
+# A download that was cut short has no mark, and is done again.
 [ -e "$rig/fetched" ] || (download)
 release=$(cat "$rig/fetched")
 [ -e "$rig/unpacked" ] || unpack

@@ -27,7 +27,7 @@ pub(super) fn read(channels: usize, lines: &mut Lines) -> Result<Frames, Animati
         return Err(lines.error(format!("`Frame Time:` is {frame_time:e} s; it must be from {low:e} to {high} s")));
     }
     if channels == 0 {
-        return Err(lines.error("no joint has channels: nothing can move"));
+        return Err(lines.error("none of the joints has channels: nothing can move"));
     }
     let rows = read_rows(channels, lines)?;
     let warnings = compare(announced as usize, rows.len(), lines)?;
@@ -58,7 +58,7 @@ fn read_rows(channels: usize, lines: &mut Lines) -> Result<Vec<Vec<f64>>, Animat
 fn compare(announced: usize, found: usize, lines: &Lines) -> Result<Option<String>, AnimationError> {
     match found {
         _ if found == announced => Ok(None),
-        0 => Err(lines.error("no frame follows: the file is torn")),
+        0 => Err(lines.error("the frames are missing: the file is torn")),
         _ if found + 1 < announced => {
             Err(lines.error(format!("the file announces {announced} frames and ends after {found}: it is torn")))
         }

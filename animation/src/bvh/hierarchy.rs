@@ -33,7 +33,7 @@ pub(super) fn read(lines: &mut Lines) -> Result<Vec<BvhJoint>, AnimationError> {
     }
 }
 
-/// What an open brace belongs to.
+/// The item that an open brace belongs to.
 #[derive(Clone, Copy)]
 enum Block {
     Joint(usize),

@@ -40,7 +40,7 @@ pub struct Bvh {
     pub frames: Vec<Vec<f64>>,
     /// True where position channels of joints other than the root add to their offset; false where they replace it.
     pub positions_add: bool,
-    /// What was wrong with the file and could be put right, a sentence each.
+    /// Problems of the file that could be put right, a sentence each.
     pub warnings: Vec<String>,
 }
 

@@ -33,8 +33,8 @@ pub(super) fn subject_from_source(
     face_front: bool,
 ) -> UnitQuaternion<f64> {
     let hips = bvh.joint_frames(first)[source.pelvis].rotation * reference.pelvis;
-    let facing = if face_front { hips * Vector3::z() } else { reference.up.yzx() };
-    let level = facing - reference.up * reference.up.dot(&facing);
+    let forward = if face_front { hips * Vector3::z() } else { reference.up.yzx() };
+    let level = forward - reference.up * reference.up.dot(&forward);
     // Someone who lies on the back or the belly has no level front: the direction of the head serves then.
     let front = unit_or(&level, &(hips * Vector3::y()));
     align([&reference.up, &front], [&Vector3::y(), &Vector3::z()])

@@ -12,8 +12,8 @@ use toile_geometry::direction::{align, swing, unit_or};
 
 use super::{
     constants::{Constants, bone},
+    flat_foot,
     moments::{leftward, most_upright_frame, motion_up, sampled, standing_body, torso},
-    stance,
 };
 use crate::{Bvh, skeleton::Source};
 
@@ -41,7 +41,7 @@ pub(super) fn find_reference(bvh: &Bvh, source: &Source, target: &Skeleton) -> C
     let turned = target_in_reference(bvh, source, target, &moment, &trunk, Some(&hinges));
     let mut reference = calibrated(source, &moment, &trunk, &turned, up, false);
     for foot in [Joint::LeftFoot, Joint::RightFoot] {
-        stance::calibrate_foot(bvh, source, target, foot, &mut reference);
+        flat_foot::calibrate_foot(bvh, source, target, foot, &mut reference);
     }
     reference
 }

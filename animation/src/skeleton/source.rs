@@ -46,7 +46,7 @@ impl Source {
         Point3::from(world[self.required(joint)].translation.vector)
     }
 
-    /// What limb joint `joint` points at, when the file's joints stand at `world`.
+    /// The place that limb joint `joint` points at, when the file's joints stand at `world`.
     pub fn tip(&self, joint: Joint, bvh: &Bvh, world: &[Isometry3<f64>]) -> Option<Point3<f64>> {
         match self.tips[joint.index()].as_ref()? {
             Tip::EndSite(j) => bvh.joints[*j].end_position(&world[*j]),

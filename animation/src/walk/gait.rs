@@ -58,11 +58,11 @@ impl Gait {
     /// The left foot at `phase` of the cycle (0 is its heel strike), as seen from the walker.
     pub fn foot(self, phase: f64) -> Foot {
         let phase = phase.rem_euclid(1.0);
-        if phase <= STANCE { self.stance(phase) } else { self.swing(phase) }
+        if phase <= STANCE { self.planted(phase) } else { self.swing(phase) }
     }
 
     /// On the ground: the sole stays where it is while the walker passes.
-    fn stance(self, phase: f64) -> Foot {
+    fn planted(self, phase: f64) -> Foot {
         // the flat ankle is below the hips somewhat before the middle of stance
         let planted = self.stride * (0.25 - phase);
         let flat = Vector3::new(0.075, ANKLE_HEIGHT, planted);
@@ -80,8 +80,8 @@ impl Gait {
     /// In the air: a smooth path from toe-off to the next heel strike, velocities continuous.
     fn swing(self, phase: f64) -> Foot {
         const STEP: f64 = 1e-4;
-        let (from, to) = (self.stance(STANCE), self.stance(0.0));
-        let (before, after) = (self.stance(STANCE - STEP), self.stance(STEP));
+        let (from, to) = (self.planted(STANCE), self.planted(0.0));
+        let (before, after) = (self.planted(STANCE - STEP), self.planted(STEP));
         let (span, at) = (1.0 - STANCE, (phase - STANCE) / (1.0 - STANCE));
         let leaving = (from.ankle - before.ankle) * (span / STEP);
         let landing = (after.ankle - to.ankle) * (span / STEP);

@@ -11,10 +11,13 @@ use nalgebra::Matrix4;
 use serde_json::{Map, Value};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
-use super::{inventory::Listing, rigid::rigid_from_matrix, timed::has_extension};
+use super::{
+    inventory::{Listing, has_extension},
+    rigid::rigid_from_matrix,
+};
 use crate::{CaptureError, DeviceIdentity, Rig, Sensor, depth_codec::MAX_PIXELS, files::read_text};
 
-/// What a calibration file says.
+/// The content of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CameraFile {
     pub(super) depth: PinholeCamera,
@@ -70,21 +73,43 @@ fn find_in(folder: &Path) -> Result<Option<PathBuf>, CaptureError> {
     Ok(found.map(|name| folder.join(name)))
 }
 
+/// A field that is missing or impossible, or another problem of the whole file.
+#[derive(Debug)]
+pub(super) struct Fault {
+    field: Option<String>,
+    reason: String,
+}
+
+impl Fault {
+    fn at(prefix: &str, name: &str, reason: impl Into<String>) -> Self {
+        Self { field: Some(format!("{prefix}{name}")), reason: reason.into() }
+    }
+
+    fn of_file(reason: impl Into<String>) -> Self {
+        Self { field: None, reason: reason.into() }
+    }
+}
+
 /// Reads a calibration file.
 pub(super) fn read(path: &Path) -> Result<CameraFile, CaptureError> {
     let text = read_text(path)?;
-    parse(&text).map_err(|reason| CaptureError::format(path, reason))
+    parse(&text).map_err(|fault| match fault.field {
+        Some(field) => CaptureError::field(path, field, fault.reason),
+        None => CaptureError::format(path, fault.reason),
+    })
 }
 
-pub(super) fn parse(text: &str) -> Result<CameraFile, String> {
-    let value: Value = serde_json::from_str(text).map_err(|error| format!("is not readable JSON: {error}"))?;
-    let object = value.as_object().ok_or("must be a JSON object with width, height, fx, fy, cx, cy")?;
+pub(super) fn parse(text: &str) -> Result<CameraFile, Fault> {
+    let value: Value =
+        serde_json::from_str(text).map_err(|error| Fault::of_file(format!("is not readable JSON: {error}")))?;
+    let object = value.as_object();
+    let object = object.ok_or_else(|| Fault::of_file("must be a JSON object with width, height, fx, fy, cx, cy"))?;
     let depth = parse_camera(object, "")?;
     let depth_scale = optional_positive(object, "depth_scale")?;
     let color = match object.get("color") {
         None | Some(Value::Null) => None,
         Some(Value::Object(color)) => Some((parse_camera(color, "color.")?, parse_pose(object, "color_from_depth")?)),
-        Some(_) => return Err("field `color` must be an object with the colour camera's fields".to_string()),
+        Some(_) => return Err(Fault::at("", "color", "must be an object with the colour camera's fields")),
     };
     Ok(CameraFile {
         depth,
@@ -94,12 +119,12 @@ pub(super) fn parse(text: &str) -> Result<CameraFile, String> {
     })
 }
 
-fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCamera, String> {
+fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCamera, Fault> {
     let width = pixels(object, prefix, "width")?;
     let height = pixels(object, prefix, "height")?;
     let [fx, fy, cx, cy] = if let Some(matrix) = object.get("intrinsic_matrix") {
         let m: [f64; 9] =
-            numbers(matrix).ok_or_else(|| format!("field `{prefix}intrinsic_matrix` must be a list of 9 numbers"))?;
+            numbers(matrix).ok_or_else(|| Fault::at(prefix, "intrinsic_matrix", "must be a list of 9 numbers"))?;
         // Below the diagonal a camera matrix is zero, which shows the order that it is written in.
         let is_by_row = m[6] == 0.0 && m[7] == 0.0 && (m[2] != 0.0 || m[5] != 0.0);
         if is_by_row { [m[0], m[4], m[2], m[5]] } else { [m[0], m[4], m[6], m[7]] }
@@ -109,55 +134,60 @@ fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCame
     };
     for (name, focal) in [("fx", fx), ("fy", fy)] {
         if focal <= 0.0 {
-            return Err(format!("field `{prefix}{name}` is {focal}; a focal length in pixels is above 0"));
+            return Err(Fault::at(prefix, name, format!("is {focal}; a focal length in pixels is above 0")));
         }
     }
     for (name, centre, size) in [("cx", cx, width), ("cy", cy, height)] {
         if !(0.0..=f64::from(size)).contains(&centre) {
-            return Err(format!("field `{prefix}{name}` is {centre}: that is outside of the picture's {size} pixels"));
+            return Err(Fault::at(
+                prefix,
+                name,
+                format!("is {centre}: that is outside of the picture's {size} pixels"),
+            ));
         }
     }
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(format!("fields `{prefix}width` and `{prefix}height`: {width} x {height} pixels are too many"));
+        let reason = format!("and `{prefix}height` give {width} x {height} pixels, which are too many");
+        return Err(Fault::at(prefix, "width", reason));
     }
     let distortion = match object.get("distortion") {
         None | Some(Value::Null) => [0.0; 5],
         Some(list) => numbers(list)
-            .ok_or_else(|| format!("field `{prefix}distortion` must be a list of 5 numbers: k1 k2 p1 p2 k3"))?,
+            .ok_or_else(|| Fault::at(prefix, "distortion", "must be a list of 5 numbers: k1 k2 p1 p2 k3"))?,
     };
     Ok(PinholeCamera { distortion, ..PinholeCamera::ideal(width, height, fx, fy, cx, cy) })
 }
 
-fn pixels(object: &Map<String, Value>, prefix: &str, name: &str) -> Result<u32, String> {
+fn pixels(object: &Map<String, Value>, prefix: &str, name: &str) -> Result<u32, Fault> {
     let value = required(object, prefix, name)?;
     if value.fract() == 0.0 && (1.0..=16384.0).contains(&value) {
         return Ok(value as u32);
     }
-    Err(format!("field `{prefix}{name}` is {value}; it must be a whole number of pixels from 1 to 16384"))
+    Err(Fault::at(prefix, name, format!("is {value}; it must be a whole number of pixels from 1 to 16384")))
 }
 
-fn required(object: &Map<String, Value>, prefix: &str, name: &str) -> Result<f64, String> {
+fn required(object: &Map<String, Value>, prefix: &str, name: &str) -> Result<f64, Fault> {
     match object.get(name) {
-        None => Err(format!("field `{prefix}{name}` is missing")),
+        None => Err(Fault::at(prefix, name, "is missing")),
         Some(value) => value
             .as_f64()
             .filter(|x| x.is_finite())
-            .ok_or_else(|| format!("field `{prefix}{name}` must be a number, but is {value}")),
+            .ok_or_else(|| Fault::at(prefix, name, format!("must be a number, but is {value}"))),
     }
 }
 
-fn optional_positive(object: &Map<String, Value>, name: &str) -> Result<Option<f64>, String> {
+fn optional_positive(object: &Map<String, Value>, name: &str) -> Result<Option<f64>, Fault> {
     match object.get(name) {
         None | Some(Value::Null) => Ok(None),
         Some(_) => match required(object, "", name)? {
             value if value > 0.0 => Ok(Some(value)),
-            value => Err(format!("field `{name}` is {value}; it must be above 0")),
+            value => Err(Fault::at("", name, format!("is {value}; it must be above 0"))),
         },
     }
 }
 
-fn parse_pose(object: &Map<String, Value>, name: &str) -> Result<Rigid, String> {
-    let wrong = || format!("field `{name}` must be 16 numbers: a 4x4 rigid transform row by row, metres");
+fn parse_pose(object: &Map<String, Value>, name: &str) -> Result<Rigid, Fault> {
+    let wrong = || Fault::at("", name, "must be 16 numbers: a 4x4 rigid transform row by row, metres");
     let list: [f64; 16] = object.get(name).and_then(numbers).ok_or_else(wrong)?;
     rigid_from_matrix(&Matrix4::from_row_slice(&list)).ok_or_else(wrong)
 }
@@ -191,7 +221,8 @@ mod tests {
             (GOOD[..40].to_string(), "not readable JSON"),
         ];
         for (text, expected) in cases {
-            let reason = parse(&text).unwrap_err();
+            let Fault { field, reason } = parse(&text).unwrap_err();
+            let reason = field.map_or(reason.clone(), |field| format!("`{field}` {reason}"));
             assert!(reason.contains(expected), "{text}\nsaid: {reason}\nexpected: {expected}");
         }
     }

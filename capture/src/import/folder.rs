@@ -7,8 +7,10 @@ use std::{
 
 use super::{
     camera_file::{self, CameraFile},
-    inventory::{DEFAULT_FPS, Entry, FolderSource, Listing, Refused, last_number, measured_fps, pair, steady_time},
-    timed::{Timed, has_extension, named_by_time, pair_by_time},
+    inventory::{
+        DEFAULT_FPS, Entry, FolderSource, Listing, Refused, has_extension, last_number, measured_fps, pair, steady_time,
+    },
+    timed::{Timed, named_by_time, pair_by_time},
 };
 use crate::{CaptureError, files::read_text, printable, trajectory::parse_seconds};
 

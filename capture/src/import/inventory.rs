@@ -15,7 +15,10 @@ pub(super) const DEFAULT_FPS: f64 = 30.0;
 /// The largest frame number: a larger one is something else, and would only be rounded.
 const MAX_NUMBER: u64 = 999_999_999_999;
 
-/// The names in a folder, sorted. Files that operating systems add (hidden ones such as `._000001.png` of a Mac, and
+/// A file with one of these extensions is an image, which must not be left out in silence.
+const IMAGES: &[&str] = &["png", "jpg", "jpeg"];
+
+/// The names in a folder, sorted; an image whose name is not UTF-8 is an error. Files that operating systems add (hidden ones such as `._000001.png` of a Mac, and
 /// `Thumbs.db` or `desktop.ini`) are passed over.
 #[derive(Debug, Default)]
 pub(super) struct Listing {
@@ -28,7 +31,13 @@ impl Listing {
         let mut listing = Self::default();
         for entry in std::fs::read_dir(path).map_err(|error| CaptureError::io(path, error))? {
             let entry = entry.map_err(|error| CaptureError::io(path, error))?;
-            let Ok(name) = entry.file_name().into_string() else { continue };
+            let name = match entry.file_name().into_string() {
+                Ok(name) => name,
+                Err(name) if has_extension(&name.to_string_lossy(), IMAGES) => {
+                    return Err(CaptureError::format(&entry.path(), "its name is not valid UTF-8; rename it"));
+                }
+                Err(_) => continue,
+            };
             if is_of_the_system(&name) {
                 continue;
             }
@@ -50,7 +59,7 @@ impl Listing {
         for name in &self.files {
             let Some(number) = number(name) else { continue };
             if number > MAX_NUMBER {
-                let reason = format!("{number} in its name is not a frame number: it has more than 12 digits");
+                let reason = "the number in its name has more than 12 digits: it is not a frame number";
                 return Err(CaptureError::format(&folder.join(name), reason));
             }
             if let Some(other) = files.insert(number, folder.join(name)) {
@@ -66,12 +75,18 @@ fn is_of_the_system(name: &str) -> bool {
     name.starts_with('.') || ["thumbs.db", "desktop.ini"].contains(&name.to_ascii_lowercase().as_str())
 }
 
-/// The last run of digits in a file's stem: its frame number.
+/// True where a file's name ends in one of these extensions.
+pub(super) fn has_extension(name: &str, extensions: &[&str]) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, extension)| extensions.contains(&extension.to_ascii_lowercase().as_str()))
+}
+
+/// The last run of digits in a file's stem: its frame number. One beyond 64 bits gives [`u64::MAX`], which
+/// [`Listing::numbered`] refuses.
 pub(super) fn last_number(name: &str) -> Option<u64> {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let digits = |c: char| c.is_ascii_digit();
     let ending = &stem[..=stem.rfind(digits)?];
-    ending[ending.trim_end_matches(digits).len()..].parse().ok()
+    Some(ending[ending.trim_end_matches(digits).len()..].parse().unwrap_or(u64::MAX))
 }
 
 /// Where one frame's images are.
@@ -234,8 +249,9 @@ mod tests {
         assert_eq!(last_number("cam2_depth_0031.png"), Some(31));
         assert_eq!(last_number("7x.png"), Some(7));
         assert_eq!(last_number("depth.png"), None);
+        assert_eq!(last_number("99999999999999999999999.png"), Some(u64::MAX));
         assert_eq!(last_number("M\u{fc}0031.png"), Some(31), "the digits may follow any character");
         assert_eq!(last_number("7\u{8eab}.png"), Some(7));
-        assert_eq!(last_number("depth.mp4"), None, "the extension's digits are no frame number");
+        assert_eq!(last_number("depth.mp4"), None, "the extension's digits are not a frame number");
     }
 }

@@ -139,7 +139,7 @@ fn unknown(path: &Path, listing: &Listing) -> CaptureError {
     } else {
         format!("did you mean a folder in it: {}?", printable(&hints.join(", ")))
     };
-    CaptureError::format(path, format!("no known layout of depth images is in this folder; {hint}"))
+    CaptureError::format(path, format!("its layout of depth images is not known; {hint}"))
 }
 
 fn names() -> String {

@@ -13,7 +13,7 @@
 //!
 //! ```no_run
 //! use toile_capture::import;
-//! let mut source = import::open("somewhere/alder/00-body".as_ref(), None)?;
+//! let mut source = import::open("somewhere/anna/00-body".as_ref(), None)?;
 //! while let Some(frame) = source.next_frame()? {
 //!     println!("{} {}", frame.index, frame.depth.is_some());
 //! }

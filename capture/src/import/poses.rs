@@ -54,7 +54,7 @@ fn uva_pose(depth: &Path) -> Result<Option<Rigid>, CaptureError> {
     let r = Matrix3::from_row_slice(&uva::read_matrix::<9>(&path, "R")?);
     let [x, y, z] = uva::read_matrix::<3>(&path, "t")?;
     let pose = rigid_from_parts(&r, Vector3::new(x, y, z));
-    pose.map(Some).ok_or_else(|| CaptureError::format(&path, "field `R` is not a rotation"))
+    pose.map(Some).ok_or_else(|| CaptureError::field(&path, "R", "is not a rotation"))
 }
 
 fn seven_scenes_pose(depth: &Path) -> Result<Option<Rigid>, CaptureError> {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::number_list::number_list;
 use crate::{CaptureError, Frame, Recorder, Rig, Source};
 
-/// What an import copied, and what it could not.
+/// The result of an import: frames copied, and those that could not be.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct ImportReport {
     /// Frames in the recording.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::inventory::{Entry, Listing};
+use super::inventory::{Entry, Listing, has_extension};
 use crate::{CaptureError, associate::associate, trajectory::parse_seconds};
 
 /// Depth and colour further apart than this do not belong together (the TUM benchmark's own default).
@@ -61,11 +61,6 @@ pub(super) fn named_by_time(
     }
 }
 
-/// True where a file's name ends in one of these extensions.
-pub(super) fn has_extension(name: &str, extensions: &[&str]) -> bool {
-    name.rsplit_once('.').is_some_and(|(_, extension)| extensions.contains(&extension.to_ascii_lowercase().as_str()))
-}
-
 /// The time that a file's name is, nanoseconds: seconds with a fraction (`1617685268.377345.png`), or a Unix time in
 /// milliseconds, microseconds or nanoseconds, which is recognised by its 13, 16 or 19 digits.
 pub(super) fn time_of_name(name: &str) -> Option<i64> {
@@ -107,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_times_are_told_from_numbers() {
+    fn names_that_are_times_are_distinguished_from_numbers() {
         assert_eq!(time_of_name("1617685268.377345.png"), Some(1_617_685_268_377_345_000));
         assert_eq!(time_of_name("12.5.jpg"), Some(12_500_000_000));
         assert_eq!(time_of_name("1617685268377.png"), Some(1_617_685_268_377_000_000));

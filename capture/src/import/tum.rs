@@ -11,8 +11,10 @@ use toile_geometry::camera::PinholeCamera;
 use super::{
     camera_file::{self, CameraFile},
     images,
-    inventory::{DEFAULT_FPS, Entry, FolderSource, Listing, last_number, measured_fps, pair, steady_time},
-    timed::{Timed, has_extension, pair_by_time},
+    inventory::{
+        DEFAULT_FPS, Entry, FolderSource, Listing, has_extension, last_number, measured_fps, pair, steady_time,
+    },
+    timed::{Timed, pair_by_time},
 };
 use crate::{CaptureError, files::read_text, printable, trajectory::parse_seconds};
 

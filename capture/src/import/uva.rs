@@ -29,7 +29,7 @@ pub(super) fn open(path: &Path, listing: &Listing, apply_mask: bool) -> Result<F
     let k = read_matrix::<9>(camera, "intrinsic")?;
     let camera_model = PinholeCamera::ideal(width, height, k[0], k[4], k[2], k[5]);
     if !camera_model.is_valid() {
-        return Err(CaptureError::format(camera, "field `intrinsic` is not a camera matrix"));
+        return Err(CaptureError::field(camera, "intrinsic", "is not a camera matrix"));
     }
     let rig = CameraFile::ideal(camera_model).rig("uva", DEPTH_SCALE, DEFAULT_FPS, !color.is_empty());
     let entries = pair(depth, color, masks, |_, number| steady_time(number, DEFAULT_FPS));
@@ -49,7 +49,7 @@ pub(super) fn numbered(name: &str, suffix: &str) -> Option<u64> {
 pub(super) fn read_matrix<const N: usize>(path: &Path, name: &str) -> Result<[f64; N], CaptureError> {
     let text = read_text(path)?;
     parse_matrix(&text, name)
-        .ok_or_else(|| CaptureError::format(path, format!("field `{name}` is missing, or does not have {N} numbers")))
+        .ok_or_else(|| CaptureError::field(path, name, format!("is missing, or does not have {N} numbers")))
 }
 
 pub(super) fn parse_matrix<const N: usize>(text: &str, name: &str) -> Option<[f64; N]> {

@@ -1,13 +1,13 @@
-//! What an inspection found, as values.
+//! The findings of an inspection, as values.
 
 use serde::Serialize;
 
 use crate::Loss;
 
-/// What [`inspect`](crate::inspect()) found.
+/// The findings of [`inspect`](crate::inspect()).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
-    /// What was looked at.
+    /// The path that was inspected.
     pub path: String,
     /// The subject's name and date, where it is one.
     pub subject: Option<SubjectInspection>,
@@ -33,7 +33,7 @@ pub struct SubjectInspection {
 pub struct TakeInspection {
     /// Layer label such as `01-trousers`, or the file's name.
     pub name: String,
-    /// What garment it shows, where that is known.
+    /// The type of the garment that it shows, where it is known.
     pub garment: Option<String>,
     /// `mcap`, or the layout of a folder.
     pub format: String,
@@ -45,11 +45,11 @@ pub struct TakeInspection {
     pub duration_s: f64,
     /// Its sensors.
     pub sensors: Vec<SensorInspection>,
-    /// What a torn or damaged file lost.
+    /// The losses of a torn or damaged file.
     pub loss: Option<Loss>,
     /// Frames that cannot be read, with the reason.
     pub unreadable: Vec<String>,
-    /// What is wrong, a sentence each; empty where the take is healthy.
+    /// Problems, a sentence each; empty where the take is healthy.
     pub problems: Vec<String>,
 }
 

@@ -3,7 +3,7 @@
 use super::findings::{Gap, SensorInspection, TakeInspection};
 use crate::{ColorImage, Frame, Rig, Source};
 
-/// What is summed up over one sensor's frames.
+/// Sums over one sensor's frames.
 #[derive(Default)]
 struct Tally {
     valid: u64,

@@ -1,4 +1,4 @@
-//! What is in a recording, a folder or a subject, and whether it is healthy.
+//! The contents of a recording, a folder or a subject, and whether it is healthy.
 
 mod findings;
 mod frames;

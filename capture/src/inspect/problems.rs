@@ -1,4 +1,4 @@
-//! What is wrong with a take.
+//! Problems of a take.
 
 use super::findings::{SensorInspection, TakeInspection};
 use crate::import::number_list;
@@ -8,7 +8,7 @@ const MIN_VALID_SHARE: f64 = 0.02;
 /// A measured rate that differs by more than this (relative) from the nominal one is reported.
 const RATE_TOLERANCE: f64 = 0.2;
 
-/// What is wrong with a take, a sentence each.
+/// Problems of a take, a sentence each.
 pub(super) fn problems(take: &TakeInspection) -> Vec<String> {
     let mut problems = Vec::new();
     if let Some(loss) = &take.loss {

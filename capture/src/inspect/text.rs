@@ -1,4 +1,4 @@
-//! What an inspection found, for people.
+//! The findings of an inspection, for people.
 
 use std::fmt::{self, Write};
 

@@ -50,7 +50,7 @@ enum Packing {
     Zstd(usize),
 }
 
-/// What stands in the file, known from the heads of its records alone.
+/// The content of the file, known from the heads of its records alone.
 #[derive(Debug, Default)]
 pub(super) struct Outline {
     pub(super) chunks: Vec<Chunk>,
@@ -240,7 +240,7 @@ impl Container {
     }
 }
 
-/// What stands before a chunk's records.
+/// The head of a chunk, before its records.
 struct ChunkHead<'a> {
     unpacked: u64,
     crc: u32,
@@ -274,7 +274,7 @@ fn add_loose(chunks: &mut Vec<Chunk>, at: u64, length: u64) {
     }
 }
 
-/// What follows the name in a metadata record, where the name is `name`.
+/// The content after the name in a metadata record, where the name is `name`.
 fn named_content(bytes: &[u8], name: &str) -> Option<Vec<u8>> {
     let mut cursor = Cursor(bytes);
     (cursor.string()? == name).then(|| cursor.0.to_vec())

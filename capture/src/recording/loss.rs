@@ -1,10 +1,10 @@
-//! What a torn or damaged recording lost.
+//! Losses of a torn or damaged recording.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// What could not be read of a torn or damaged recording.
+/// The losses of a torn or damaged recording.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Loss {
     /// Bytes that could not be read: after the last whole chunk, and in damaged ones.

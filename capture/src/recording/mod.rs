@@ -1,6 +1,6 @@
 //! Recordings: frames of a rig as one MCAP file, and back.
 //!
-//! What is inside (see `docs/recording.md`): a metadata record `toile.recording` with the rig as JSON; per sensor the
+//! The contents (see `docs/recording.md`): a metadata record `toile.recording` with the rig as JSON; per sensor the
 //! channels `/NAME/depth/image`, `/NAME/color/image`, `/NAME/depth/calibration`, `/NAME/color/calibration`; chunks
 //! without compression (the payloads are compressed already) that each hold whole frames, with CRC and index. An MCAP
 //! message's log time is the host time, its publish time the device time, its sequence the device's frame number.

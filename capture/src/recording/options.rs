@@ -32,7 +32,7 @@ impl Default for RecorderOptions {
     }
 }
 
-/// What a finished recording holds.
+/// The content of a finished recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordingSummary {
     /// The file.

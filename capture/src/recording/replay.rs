@@ -90,7 +90,7 @@ impl Replay {
         self.entries.is_empty()
     }
 
-    /// What could not be read, where the file is torn or damaged.
+    /// The losses, where the file is torn or damaged.
     pub fn lost(&self) -> Option<&Loss> {
         self.lost.as_ref()
     }

@@ -14,7 +14,7 @@ pub(super) const MAX_FRAMES: usize = 1 << 20;
 /// records, count as damaged and are left out.
 ///
 /// # Errors
-/// What `visit` says.
+/// The error of `visit`.
 pub(super) fn for_each_record(
     container: &mut Container,
     outline: &mut Outline,

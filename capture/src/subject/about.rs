@@ -10,7 +10,7 @@ use crate::{
     files::{atomic_write, read_text},
 };
 
-/// What `subject.toml` says.
+/// The content of `subject.toml`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct About {
     pub(super) name: String,

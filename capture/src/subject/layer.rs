@@ -7,7 +7,7 @@ use crate::printable;
 /// Name of the layer of take 0.
 pub const BODY: &str = "body";
 
-/// What a take added, in the order of the takes.
+/// The addition of a take, in the order of the takes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
     /// Number of the take: 0 is the body.

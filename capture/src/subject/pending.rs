@@ -20,14 +20,14 @@ pub struct PendingTake {
     pub layer: Layer,
     /// Where to record to.
     pub path: PathBuf,
-    /// What the rig is called; entered into `subject.toml` where that names none yet.
+    /// The name of the rig; entered into `subject.toml` where that names none yet.
     pub rig: String,
     /// Where the frames come from (an imported folder); empty for cameras.
     pub source: String,
     pub(super) retake: bool,
 }
 
-/// What `pending.toml` says: enough to enter the take into `subject.toml` when the program was killed before it could.
+/// The content of `pending.toml`: enough to enter the take into `subject.toml` when the program was killed before it could.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Note {
     pub(super) number: usize,

@@ -51,7 +51,7 @@ impl Subject {
         &self.about.date
     }
 
-    /// What the rig is called; empty until it is known.
+    /// The name of the rig; empty until it is known.
     pub fn rig(&self) -> &str {
         &self.about.rig
     }

@@ -15,16 +15,6 @@ use toile_geometry::{Rigid, camera::PinholeCamera};
 pub const WIDTH: u32 = 24;
 pub const HEIGHT: u32 = 16;
 
-/// The private test data, or `None` with a line that says so.
-pub fn shared(what: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data").join(what);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not here", path.display());
-    None
-}
-
 pub fn rig(sensors: usize) -> Rig {
     let camera = PinholeCamera::ideal(WIDTH, HEIGHT, 20.1 / 3.0, 19.7, 11.5, 7.5);
     let sensor = |i: usize| Sensor {

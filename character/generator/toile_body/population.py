@@ -22,7 +22,7 @@ SOLVED = (
 )
 SOFT_STRONG = (2, 3)  # their places in SOLVED
 TOLERANCE = np.array([0.001, 0.006, 0.005, 0.006, 0.005])  # of the logarithm of each measure
-MOST = 0.35  # of a slider's change in a step
+MAX_STEP = 0.35  # of a slider's change in a step
 REFRESH = 1  # after this step the Jacobian is measured anew; else it is updated
 CHUNK = 100
 
@@ -139,7 +139,7 @@ def gauss_newton(x, x0, f, goal, jacobian):
             break
         step[out] = (np.clip(x + step, low, high) - x)[out]
         free &= ~out
-    return np.clip(x + np.clip(step, -MOST, MOST), low, high)
+    return np.clip(x + np.clip(step, -MAX_STEP, MAX_STEP), low, high)
 
 
 def get_solved(sliders, people):

@@ -75,7 +75,7 @@ def cut_weights(dense):
 
 
 def rotation_between(a, b):
-    """Least rotation that takes direction a to direction b (3 x 3)."""
+    """The smallest rotation that takes direction a to direction b (3 x 3)."""
     a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
     v, c = np.cross(a, b), a @ b
     k = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])

@@ -5,7 +5,7 @@ use toile_driver_transport::PacketStatus;
 
 use crate::protocol::{Role, Stream, parse_packet};
 
-/// What a stream lost so far.
+/// Losses of a stream so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Losses {
     /// Packets that the sequence numbers say were sent and that did not arrive whole.
@@ -33,7 +33,7 @@ impl Assembler {
         Self { stream, bytes: vec![0; frame_bytes], filled: None, next_sequence: None, losses: Losses::default() }
     }
 
-    /// What was lost so far.
+    /// Losses so far.
     pub fn losses(&self) -> Losses {
         self.losses
     }

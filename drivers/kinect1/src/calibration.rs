@@ -25,7 +25,7 @@ pub const MAX_MM: u16 = 10_000;
 /// uses 2.4 whatever it states.
 const COLOR_CM: f64 = 2.4;
 
-/// What the camera states about itself.
+/// The camera's statements about itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// Emitter to depth camera, centimetres.

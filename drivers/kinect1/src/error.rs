@@ -1,4 +1,4 @@
-//! What can go wrong with a Kinect.
+//! Errors of a Kinect.
 
 use toile_driver_transport::TransportError;
 
@@ -15,7 +15,7 @@ pub enum Kinect1Error {
     Answer {
         /// The command.
         command: u16,
-        /// What is wrong with the answer.
+        /// The fault of the answer.
         reason: String,
     },
     /// The camera's calibration cannot be true.
@@ -25,7 +25,7 @@ pub enum Kinect1Error {
     Calibration(String),
     /// No frame came although the streams are on.
     #[error(
-        "Kinect v1: no frame for {0:.1} s; check its power supply, and that nothing else on its USB controller streams"
+        "Kinect v1: the camera sent no frame for {0:.1} s; check its power supply, and that nothing else on its USB controller streams"
     )]
     Silent(f64),
 }

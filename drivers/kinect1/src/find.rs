@@ -10,7 +10,7 @@ const CAMERAS: [u16; 2] = [0x02ae, 0x02bf];
 pub(crate) const KINECT_FOR_WINDOWS: u16 = 0x02bf;
 /// Product ids of the microphones, whose serial number stands for the camera's in models after 1414.
 const MICROPHONES: [u16; 4] = [0x02ad, 0x02be, 0x02c3, 0x02bb];
-/// What those cameras report instead of a serial number (libfreenect `src/usb_libusb10.c`).
+/// The text that those cameras report instead of a serial number (libfreenect `src/usb_libusb10.c`).
 const NO_SERIAL: &str = "0000000000000000";
 
 /// The Kinects on a bus, each with its serial number (empty where it cannot be read).

@@ -3,7 +3,7 @@
 //! The way of a frame, a file each:
 //!
 //! 1. [`protocol`]: bytes to packets and commands, and back, pure;
-//! 2. [`Assembler`]: packets to whole frames; what is lost is counted, what is torn is dropped;
+//! 2. [`Assembler`]: packets to whole frames; losses are counted, torn ones are dropped;
 //! 3. [`decode`]: packed depth, infrared and Bayer colours to images, pure;
 //! 4. [`Calibration`]: the device's own calibration; raw depth to millimetres; [`Registration`]: depth as colour sees it;
 //! 5. `streams`: transfers to frames, depth and colour of one time paired ([`toile_capture::pairing`]);

@@ -21,7 +21,7 @@ const MAX_TILT: f64 = 31.0;
 /// Each request is answered at once or never.
 const LIMIT: Duration = Duration::from_millis(500);
 
-/// What the LED shows (libfreenect `freenect_led_options`).
+/// The state of the LED (libfreenect `freenect_led_options`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u16)]
 #[allow(missing_docs)] // the names are the documentation
@@ -34,7 +34,7 @@ pub enum Led {
     BlinkingRedYellow = 6,
 }
 
-/// What the motor board measures.
+/// A measurement of the motor board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotorState {
     /// Acceleration in the Kinect's own axes (+X right, +Y up, +Z towards the scene's back), m/s²; at rest it shows up.
@@ -86,7 +86,7 @@ impl Motor {
         Ok(())
     }
 
-    /// What the board measures now.
+    /// The current measurement of the board.
     ///
     /// # Errors
     /// [`Kinect1Error`] where the request fails or is answered too short.

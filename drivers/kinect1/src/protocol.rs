@@ -113,7 +113,7 @@ pub fn command(command: u16, tag: u16, words: &[u16]) -> Vec<u8> {
 /// The data of an answer to a command: "RB", words, command, tag, data.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The problem.
 pub fn answer(bytes: &[u8], command: u16, tag: u16) -> Result<&[u8], String> {
     let Some((header, data)) = bytes.split_first_chunk::<COMMAND_HEADER>() else {
         return Err(format!("the answer has {} bytes, fewer than its header", bytes.len()));

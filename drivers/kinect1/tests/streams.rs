@@ -1,4 +1,4 @@
-//! What arrives is what the model sent, pixel by pixel, in every mode.
+//! In every mode the pictures that arrive are those that the model sent, pixel by pixel.
 #![allow(missing_docs)]
 
 mod common;

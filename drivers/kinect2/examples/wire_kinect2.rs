@@ -53,7 +53,7 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// What the model sends and what must arrive, frame by frame: depth packet, JPEG, millimetres, registered colours. Of the
+/// Each frame as the model sends it and as it must arrive: depth packet, JPEG, millimetres, registered colours. Of the
 /// pattern's, which come again and again.
 #[derive(Clone)]
 struct Images(Vec<[Arc<Vec<u8>>; 4]>);

@@ -35,7 +35,7 @@ pub struct ColorMap {
     pub polynomials: [[f64; 10]; 2],
 }
 
-/// What the camera states about itself.
+/// The camera's statements about itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// The depth camera, not mirrored, pixel centres at integers.

@@ -28,7 +28,7 @@ pub struct ColorStream {
 }
 
 impl ColorStream {
-    /// What was lost so far.
+    /// Losses so far.
     pub fn losses(&self) -> Losses {
         self.losses
     }

@@ -49,7 +49,7 @@ impl Default for DepthStream {
 }
 
 impl DepthStream {
-    /// What was lost so far.
+    /// Losses so far.
     pub fn losses(&self) -> Losses {
         self.losses
     }
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_within_an_image_is_no_loss() {
+    fn a_pause_within_an_image_is_not_a_loss() {
         let mut all = packets(2);
         (0..4).for_each(|_| all.insert(104, Vec::new()));
         assert_eq!(run(&all), (vec![0, 1], Losses::default()));

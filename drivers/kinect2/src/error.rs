@@ -1,4 +1,4 @@
-//! What can go wrong with a Kinect v2.
+//! Errors of a Kinect v2.
 
 use toile_driver_transport::TransportError;
 
@@ -18,7 +18,7 @@ pub enum Kinect2Error {
     Answer {
         /// The command.
         command: u32,
-        /// What is wrong with the answer.
+        /// The fault of the answer.
         reason: String,
     },
     /// The camera's calibration cannot be true.
@@ -31,7 +31,7 @@ pub enum Kinect2Error {
     Packet {
         /// Its length.
         bytes: usize,
-        /// What it should be.
+        /// The right value.
         expected: usize,
     },
     /// A colour image that cannot be decoded.
@@ -39,7 +39,7 @@ pub enum Kinect2Error {
     Color(String),
     /// No frame came although the streams are on.
     #[error(
-        "Kinect v2: no frame for {0:.1} s; check its power supply, and that nothing else on its USB controller streams"
+        "Kinect v2: the camera sent no frame for {0:.1} s; check its power supply, and that nothing else on its USB controller streams"
     )]
     Silent(f64),
 }

@@ -1,6 +1,6 @@
 //! How well it went.
 
-/// What a stream lost so far.
+/// Losses of a stream so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Losses {
     /// Packets (depth) or transfers (colour) that the bus lost or damaged.

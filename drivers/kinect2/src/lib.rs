@@ -3,13 +3,13 @@
 //! The way of a frame, a file each:
 //!
 //! 1. [`protocol`]: bytes to commands, answers, depth images and colour images, pure;
-//! 2. [`DepthStream`], [`ColorStream`]: what the bus brings to whole packets; what is lost is counted;
+//! 2. [`DepthStream`], [`ColorStream`]: transfers to whole packets; losses are counted;
 //! 3. `streams`: transfers to frames, depth and colour of one time paired ([`toile_capture::pairing`]);
 //! 4. [`Decoder`]: ten images of measurements to depth in millimetres, pure; [`color`]: the JPEG to pixels;
 //! 5. [`Calibration`]: the device's own calibration; [`Registration`]: colour as depth sees it;
 //! 6. [`Kinect2`]: the [`toile_capture::Source`] over it all, as [`Settings`] say; [`Health`]: how well it went.
 //!
-//! The sensor sees everything mirrored; what this crate gives is not. Protocol facts were learnt from libfreenect2
+//! The sensor sees everything mirrored; the images of this crate are not. Protocol facts were learnt from libfreenect2
 //! (<https://github.com/OpenKinect/libfreenect2>); each constant names its place.
 //!
 //! ```

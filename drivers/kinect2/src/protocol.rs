@@ -51,7 +51,7 @@ pub fn is_completion(bytes: &[u8]) -> bool {
 /// Checks that bytes are the completion of command number `sequence`.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The problem.
 pub fn completion(bytes: &[u8], sequence: u32) -> Result<(), String> {
     if !is_completion(bytes) {
         return Err(format!("{} bytes came instead of its completion", bytes.len()));
@@ -76,7 +76,7 @@ pub fn serial(bytes: &[u8]) -> Option<String> {
     (!text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric())).then_some(text)
 }
 
-/// What follows an image of a depth packet.
+/// The footer of an image of a depth packet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DepthFooter {
     /// The camera's clock, 1/8 ms.
@@ -128,7 +128,7 @@ pub fn ends_color(bytes: &[u8]) -> bool {
 /// Reads a whole colour image.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The problem.
 pub fn color_packet(bytes: &[u8]) -> Result<ColorPacket<'_>, &'static str> {
     let inner = bytes.len().checked_sub(COLOR_HEADER + COLOR_FOOTER).ok_or("it is too short")?;
     if !begins_color(bytes) || !ends_color(bytes) {

@@ -18,7 +18,7 @@ use crate::{
 /// Units of the polynomials (libfreenect2 `depth_q`, `color_q`).
 const DEPTH_UNIT: f64 = 0.01;
 const COLOR_UNIT: f64 = 0.002199;
-/// What is nearer to the colour camera is kept in cells of this many of its columns and rows: about a depth pixel.
+/// The nearest depths before the colour camera are kept in cells of this many of its columns and rows: about a depth pixel.
 const CELL: usize = 3;
 const CELLS: [usize; 2] = [COLOR_COLUMNS.div_ceil(CELL), COLOR_ROWS.div_ceil(CELL)];
 /// A pixel is hidden where something is nearer by this share of its depth; pixels nearer together are of one surface.

@@ -1,4 +1,4 @@
-//! What frames' sensor is.
+//! The sensor that frames come from.
 
 use toile_capture::{ClockDomain, DeviceIdentity, Rig, Sensor};
 use toile_geometry::Rigid;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::DecodeSettings;
 
-/// What comes with depth.
+/// The images that come with depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ColorMode {
     /// The colour of each depth pixel, by the device's registration: 512×424.
@@ -21,7 +21,7 @@ pub enum ColorMode {
 pub struct Settings {
     /// Default: registered.
     pub color: ColorMode,
-    /// What depth is dropped.
+    /// The depth that is dropped.
     pub decode: DecodeSettings,
     /// Depth transfers in flight, of a millisecond each. Default 56: with colour's just below the 16 MB that Linux gives
     /// USB programs.

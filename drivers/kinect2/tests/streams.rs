@@ -1,4 +1,4 @@
-//! What arrives is what the model sent.
+//! The pictures that arrive are those that the model sent.
 #![allow(missing_docs)]
 
 mod common;

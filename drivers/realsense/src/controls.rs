@@ -21,11 +21,11 @@ const AUTO_EXPOSURE: u8 = 0x0b;
 pub enum Exposure {
     /// By the camera itself.
     Auto,
-    /// So many microseconds.
+    /// This exposure, microseconds.
     Microseconds(u32),
 }
 
-/// What to set when the camera is opened; `None` leaves a control as it is.
+/// Controls that are set when the camera is opened; `None` leaves a control as it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Controls {

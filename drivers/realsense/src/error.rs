@@ -1,4 +1,4 @@
-//! What can go wrong with a RealSense camera.
+//! Errors of a RealSense camera.
 
 use std::path::PathBuf;
 
@@ -20,9 +20,9 @@ pub enum RealsenseError {
     Format {
         /// Device node.
         node: PathBuf,
-        /// What it gives.
+        /// The rate that it gives.
         given: String,
-        /// What was asked for.
+        /// The request.
         asked: String,
     },
     /// The firmware answered a command with something else.
@@ -30,7 +30,7 @@ pub enum RealsenseError {
     Answer {
         /// The command.
         command: u32,
-        /// What is wrong with the answer.
+        /// The fault of the answer.
         reason: String,
     },
     /// The calibration cannot be true.
@@ -38,7 +38,7 @@ pub enum RealsenseError {
     Calibration(String),
     /// No frame came although the streams are on.
     #[error(
-        "RealSense: no frame for {0:.1} s; use another cable or port, and check that nothing else on its USB controller streams"
+        "RealSense: the camera sent no frame for {0:.1} s; use another cable or port, and check that nothing else on its USB controller streams"
     )]
     Silent(f64),
 }

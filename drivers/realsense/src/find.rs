@@ -27,7 +27,7 @@ pub struct Nodes {
 /// A camera that is plugged in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Camera {
-    /// What people call it.
+    /// The name that people use.
     pub name: &'static str,
     /// Vendor and product id.
     pub id: (u16, u16),
@@ -97,7 +97,7 @@ pub fn refusal(video: &dyn Video, camera: &Camera) -> Option<TransportError> {
     its.map(|info| video.open(&info.node)).find_map(Result::err)
 }
 
-/// What a node shows.
+/// The content of a node.
 #[derive(Clone, Copy)]
 enum Part {
     Depth,

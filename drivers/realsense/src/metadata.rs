@@ -5,7 +5,7 @@
 //! cameras send blocks of their own (`md_capture_timing` of librealsense `src/metadata.h`). Kernels that do not know the
 //! camera leave those out (V4L2_META_FMT_UVC instead of _D4XX).
 
-/// What the camera says about a picture.
+/// The camera's metadata of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Metadata {
     /// Its clock at the picture, microseconds, 32 bits.
@@ -28,7 +28,7 @@ const CAPTURE_TIMING: u32 = 0x8000_0001;
 const HAS_FRAME: u32 = 1;
 const HAS_EXPOSURE: u32 = 1 << 3;
 
-/// What the blocks of a buffer say together; nothing where they are damaged. `is_whole`: the headers are whole.
+/// The metadata of a buffer's blocks together; nothing where they are damaged. `is_whole`: the headers are whole.
 pub fn parse(mut bytes: &[u8], is_whole: bool) -> Metadata {
     let mut found = Metadata::default();
     while let Some(&[length, flags]) = bytes.get(BEFORE_HEADER..BEFORE_HEADER + 2) {

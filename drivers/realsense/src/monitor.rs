@@ -25,7 +25,7 @@ const NOT_READY: i32 = -7;
 const TRIES: u32 = 20;
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// What the camera is.
+/// The identity of the camera.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Details {
     /// Firmware version, such as `5.12.7.100`.
@@ -75,7 +75,7 @@ pub enum Refusal {
     Wrong(String),
 }
 
-/// What the camera says it is (`gvd_fields` of `src/ds/ds-private.h`).
+/// The identity that the camera states (`gvd_fields` of `src/ds/ds-private.h`).
 pub fn details(data: &[u8]) -> Option<Details> {
     let version: Vec<String> = data.get(12..16)?.iter().rev().map(u8::to_string).collect();
     let serial = data.get(48..54)?.iter().map(|byte| format!("{byte:02x}")).collect();

@@ -1,4 +1,4 @@
-//! What the frames' sensors are.
+//! The sensors that frames come from.
 
 use toile_capture::{ClockDomain, DeviceIdentity, Rig, Sensor};
 use toile_geometry::Rigid;

@@ -27,7 +27,7 @@ const MAX_WAITING: usize = 64;
 pub(crate) struct Shot {
     /// The picture.
     pub(crate) buffer: VideoBuffer,
-    /// What the camera says about it; empty where the kernel gives no metadata.
+    /// The camera's metadata; empty where the kernel gives no metadata.
     pub(crate) metadata: Metadata,
 }
 

@@ -21,7 +21,7 @@ const TURN: Duration = Duration::from_millis(5);
 /// This many pictures of a stream in a row without a time mean that there will be none.
 const MAX_WITHOUT_TIME: u32 = 10;
 
-/// What came beside depth: one image, or left and right.
+/// The images beside depth: one image, or left and right.
 type Beside = (RgbImage, Option<RgbImage>);
 
 /// Depth, and colour or infrared beside it, of an open camera.

@@ -106,7 +106,7 @@ fn a_time_that_cannot_be_is_replaced_by_the_kernels() {
 }
 
 #[test]
-fn a_jump_of_seconds_is_no_loss() {
+fn a_jump_of_seconds_is_not_a_loss() {
     let jump = StreamFault::Time(20_000_000);
     let mut camera = faulty(Wire::Isochronous, &[depth_fault(2, 0, jump), color_fault(2, 0, jump)]);
     let (frames, _) = take(&mut camera, 6);

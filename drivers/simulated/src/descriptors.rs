@@ -15,7 +15,7 @@ pub struct Endpoint {
     pub interval: u8,
 }
 
-/// What the descriptors of a device with one interface say.
+/// The descriptors of a device with one interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Descriptors {
     /// Vendor, product and release.

@@ -1,4 +1,4 @@
-//! What goes wrong in a stream, and when: the same for every camera.
+//! Faults of a stream, and their times: the same for every camera.
 
 /// A fault of a stream; `S` says which stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,11 +9,11 @@ pub struct Fault<S> {
     pub frame: u64,
     /// From which packet, transfer or read of that frame.
     pub packet: usize,
-    /// What happens.
+    /// The fault.
     pub what: StreamFault,
 }
 
-/// What can happen to packets. A fault of something that a camera's packets do not have does nothing.
+/// Faults of packets. A fault of something that a camera's packets do not have does nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StreamFault {
     /// This many packets are sent but never arrive; `usize::MAX`: the rest of the frame.
@@ -95,7 +95,7 @@ impl<S: Copy + PartialEq> Faults<S> {
         self.0.iter().filter(move |fault| fault.stream == stream && fault.frame == frame)
     }
 
-    /// What happens to a packet.
+    /// The fate of a packet.
     pub(crate) fn at(&self, stream: S, frame: u64, packet: usize) -> Option<StreamFault> {
         let hits =
             |fault: &&Fault<S>| (fault.packet..fault.packet.saturating_add(fault.what.reach())).contains(&packet);

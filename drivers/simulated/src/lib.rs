@@ -10,7 +10,7 @@
 //! - [`uvc`]: UVC cameras of any shape; [`side_by_side`]: a stereo camera among them;
 //! - [`trials`]: trials that every camera has to pass (unplugs, long takes, replay), for the tests of the drivers;
 //! - [`descriptors`]: standard requests, for kernels; [`usbip`]: a simulated device behind USB/IP; [`vhci`]: plugged into a kernel;
-//!   [`proof`]: what the wire tier proves.
+//!   [`proof`]: the proofs of the wire tier.
 //!
 //! ```
 //! use std::sync::{Arc, Mutex};

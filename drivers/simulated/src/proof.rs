@@ -1,4 +1,4 @@
-//! What the wire tier proves with a model behind the kernel: a take compared with what the model sent, the first frame,
+//! The proofs of the wire tier, with a model behind the kernel: a take compared with what the model sent, the first frame,
 //! unplugging. Each proof answers in a sentence, which says what differed where it failed.
 
 use std::{
@@ -17,12 +17,12 @@ use crate::vhci::Plugged;
 const PATIENCE: Duration = Duration::from_mins(1);
 /// How often a condition is looked at.
 const LOOK: Duration = Duration::from_millis(20);
-/// What the first frame may take, and how often that is tried: other work of the machine must not decide.
+/// The time limit of the first frame, and how often that is tried: other work of the machine must not decide.
 const FIRST_LIMIT: Duration = Duration::from_secs(1);
 const FIRST_TRIES: u32 = 5;
 /// Frames of a cycle before the unplugging.
 const CYCLE_FRAMES: u32 = 2;
-/// In a take's second half at least one in so many frames has both depth and colour. A frame that lacks one is not a fault
+/// In a take's second half at least one in this many frames has both depth and colour. A frame that lacks one is not a fault
 /// of the driver's: the machine was too slow for that picture, and had the driver only failed to pair it, the model's
 /// number of the frame would come twice. But both streams must run.
 const PAIRED: u64 = 2;
@@ -47,10 +47,10 @@ pub trait Bench {
     /// Opens it with the driver.
     ///
     /// # Errors
-    /// What the driver says.
+    /// The driver's answer.
     fn open(&mut self) -> Result<Box<dyn Source>, String>;
 
-    /// What the model sent as this frame, where every pixel is the same.
+    /// The picture that the model sent as this frame, where every pixel is the same.
     ///
     /// # Errors
     /// How it differs.
@@ -74,7 +74,7 @@ pub fn same<T: PartialEq + Debug>(what: &str, seen: &[T], sent: &[T]) -> Result<
 /// the model's numbers.
 ///
 /// # Errors
-/// What differs; where most frames of the second half lack depth or colour.
+/// The difference; where most frames of the second half lack depth or colour.
 pub fn take(file: &Path, count: u64, shown: impl FnMut(&Frame) -> Shown) -> Result<String, String> {
     let replay = Replay::open(file).map_err(|error| error.to_string())?;
     let frames = (0..replay.len().min(count)).map(|index| replay.frame(index).map_err(|error| error.to_string()));

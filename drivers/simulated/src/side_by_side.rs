@@ -2,7 +2,7 @@
 
 use crate::uvc::{FormatShape, FunctionShape, Picture, Scene, Shape, SimulatedCamera, StreamShape, Wire};
 
-/// What both eyes see: brightness of frame `frame`, row by row over both views.
+/// The view of both eyes: brightness of frame `frame`, row by row over both views.
 pub trait Views: Send {
     /// Columns of both views together, and rows.
     fn size(&self) -> (u16, u16);

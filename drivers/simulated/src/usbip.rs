@@ -36,7 +36,7 @@ const IDLE: Duration = Duration::from_millis(1);
 /// Serves a model until the kernel closes the line, or the model is unplugged (the line is then ours to close).
 ///
 /// # Errors
-/// What reading and writing say; a header that no kernel sends.
+/// The errors of reading and writing; a header that no kernel sends.
 pub fn serve(model: &Mutex<dyn SimulatedDevice>, line: &mut (impl Read + Write)) -> io::Result<()> {
     let mut state = State::default();
     loop {
@@ -105,7 +105,7 @@ impl Urb {
     }
 }
 
-/// What a URB brought.
+/// The data of a URB.
 struct Done {
     status: i32,
     data: Vec<u8>,
@@ -217,7 +217,7 @@ mod tests {
     use super::*;
     use crate::kinect1::{Pattern, SimulatedCamera};
 
-    /// What the kernel says, and what it is stated.
+    /// A header of the kernel, and the answer to it.
     struct Line {
         says: io::Cursor<Vec<u8>>,
         stated: Vec<u8>,

@@ -18,7 +18,7 @@ const CONTROLLER: &str = "/sys/devices/platform/vhci_hcd.0";
 /// the controller's list of ports.
 const HIGH: (u32, &str) = (3, "hs");
 const SUPER: (u32, &str) = (5, "ss");
-/// What that list says of a free port (`VDEV_ST_NULL` of `usbip_common.h`).
+/// The state of a free port in that list (`VDEV_ST_NULL` of `usbip_common.h`).
 const FREE: &str = "004";
 
 /// A model that the kernel sees.
@@ -56,7 +56,7 @@ impl Plugged {
     /// Serves until the kernel lets go.
     ///
     /// # Errors
-    /// What serving says.
+    /// The error of serving.
     pub fn wait(self) -> io::Result<()> {
         self.thread.join().map_err(|_| io::Error::other("the server panicked"))?
     }

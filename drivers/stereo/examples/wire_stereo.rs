@@ -32,7 +32,7 @@ use toile_stereo::{DepthFromPair, DepthSettings, Lens, StereoCalibration, read_c
 
 /// The camera waits this long between frames: the matcher takes an emulated processor most of a second.
 const PACE: Duration = Duration::from_secs(1);
-/// So many frames differ.
+/// Number of frames that differ.
 const FRAMES: u64 = 5;
 /// Columns and rows of one view.
 const SIZE: (u32, u32) = scene::SIZE;
@@ -132,7 +132,7 @@ impl Views for Scene {
     }
 }
 
-/// What must arrive of each frame that differs: depth and colour.
+/// The expected content of each frame that differs: depth and colour.
 fn sent(folder: &Path) -> Outcome<Vec<(DepthImage, RgbImage)>> {
     let settings = settings();
     let calibration = read_calibration(&[folder.join("calibration.yml")], settings.metres_per_unit)?;
@@ -153,7 +153,7 @@ fn sent(folder: &Path) -> Outcome<Vec<(DepthImage, RgbImage)>> {
     (0..FRAMES).map(frame).collect()
 }
 
-/// What YUYV without colour becomes: brightness from 16..235 to 0..255.
+/// YUYV without colour, converted: brightness from 16..235 to 0..255.
 fn grey(y: u8) -> [u8; 3] {
     [((298 * (i32::from(y) - 16) + 128) >> 8).clamp(0, 255) as u8; 3]
 }

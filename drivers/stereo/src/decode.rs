@@ -5,7 +5,7 @@ use toile_capture::{
     pixels::{self, Rows},
 };
 
-/// What a buffer holds.
+/// The content of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PixelFormat {
     /// A JPEG.
@@ -19,7 +19,7 @@ pub enum PixelFormat {
 /// Layout of a buffer as V4L2 reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// What it holds.
+    /// Its content.
     pub format: PixelFormat,
     /// Columns.
     pub width: u32,

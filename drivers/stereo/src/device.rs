@@ -67,7 +67,7 @@ pub struct StereoSettings {
     pub depth: DepthSettings,
 }
 
-/// What became of the pictures so far.
+/// Counts of the pictures so far.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct PairCounts {
     /// Pairs that gave a depth frame.
@@ -152,7 +152,7 @@ impl StereoCamera {
         Ok(Self { pairs, depth, rig, counts: PairCounts::default(), next_index: 0, last_left: None, ended: false })
     }
 
-    /// What became of the pictures so far.
+    /// Counts of the pictures so far.
     pub fn counts(&self) -> PairCounts {
         self.counts
     }

@@ -1,4 +1,4 @@
-//! What can go wrong with a stereo rig.
+//! Errors of a stereo rig.
 
 use std::path::PathBuf;
 
@@ -26,7 +26,7 @@ pub enum StereoDriverError {
         height: u32,
     },
     /// The settings ask for pictures larger than any camera's.
-    #[error("`width` and `height` are {width} and {height}, but no camera has more than 16384; give those of one view")]
+    #[error("`width` and `height` are {width} and {height}, but must be at most 16384; give those of one view")]
     Size {
         /// Columns of a view.
         width: u32,
@@ -40,7 +40,7 @@ pub enum StereoDriverError {
         side: Side,
         /// The camera's number of the picture.
         sequence: u64,
-        /// What is wrong with it.
+        /// The problem.
         reason: String,
     },
     /// A folder or file of recorded pictures cannot be used.
@@ -48,7 +48,7 @@ pub enum StereoDriverError {
     Recorded {
         /// The folder or file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// The problem and the remedy.
         reason: String,
     },
     /// Reading a recording failed.

@@ -9,7 +9,7 @@ use toile_driver_transport::video::{FourCc, Video};
 pub struct WideNode {
     /// Device node, such as `/dev/video2`.
     pub node: PathBuf,
-    /// What the driver calls the camera.
+    /// The driver's name for the camera.
     pub name: String,
     /// Columns and rows of both views together, the largest on offer.
     pub size: (u32, u32),

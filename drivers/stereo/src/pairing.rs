@@ -35,7 +35,7 @@ pub struct Picture {
     pub host_time_ns: i64,
 }
 
-/// What happened at one time.
+/// The event of one time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Moment {
     /// Both cameras took a picture.

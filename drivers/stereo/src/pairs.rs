@@ -12,7 +12,7 @@ use crate::{
 
 /// Whatever yields pairs, and the pictures that found no partner.
 pub trait Pairs: Send {
-    /// What happened next; `None` at the end.
+    /// The next event; `None` at the end.
     ///
     /// # Errors
     /// [`StereoDriverError`]; after [`StereoDriverError::Picture`] the next call may go on.
@@ -56,7 +56,7 @@ pub struct TwoCameras<L: Pictures, R: Pictures> {
     right: R,
     pairer: Pairer,
     ended: [bool; 2],
-    /// What ended a camera, to be reported after the pairs that came.
+    /// The error that ended a camera, to be reported after the pairs that came.
     failed: Option<StereoDriverError>,
 }
 

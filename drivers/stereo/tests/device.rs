@@ -20,7 +20,7 @@ use toile_stereo::DepthSettings;
 /// Nanoseconds a frame.
 const PERIOD: i64 = 33_000_000;
 
-/// What a scripted camera gives next: the picture with this number, a torn one, or nothing any more.
+/// The next answer of a scripted camera: the picture with this number, a torn one, or nothing any more.
 enum Event {
     Picture(u64),
     Torn(u64),

@@ -32,7 +32,7 @@ impl Views for Scene {
     }
 }
 
-/// What YUYV without colour becomes: brightness from 16..235 to 0..255.
+/// YUYV without colour, converted: brightness from 16..235 to 0..255.
 fn shown(brightness: &[u8]) -> Vec<[u8; 3]> {
     let grey = |y: &u8| ((298 * (i32::from(*y) - 16) + 128) >> 8).clamp(0, 255) as u8;
     brightness.iter().map(|y| [grey(y); 3]).collect()

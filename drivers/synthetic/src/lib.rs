@@ -1,4 +1,4 @@
-//! A thin capture device over the synthetic scene: what a live camera would be, without hardware.
+//! A thin capture device over the synthetic scene: it stands for a live camera, without hardware.
 //!
 //! ```no_run
 //! use toile_capture::Source;

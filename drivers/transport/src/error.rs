@@ -1,10 +1,10 @@
-//! What can go wrong between a program and a USB device.
+//! Errors between a program and a USB device.
 
 use std::{io, path::Path, time::Duration};
 
 use crate::{DeviceInfo, udev::advice};
 
-/// What Linux says of a node whose device was unplugged.
+/// The error of Linux for a node whose device was unplugged.
 const ENODEV: i32 = 19;
 
 /// Errors of the transport crate.
@@ -18,13 +18,13 @@ pub enum TransportError {
     Rule {
         /// Where the rule should go.
         path: std::path::PathBuf,
-        /// What the system said.
+        /// The system's message.
         source: std::io::Error,
     },
     /// Nothing of the kind is plugged in.
     #[error("{what} is not plugged in; check the cable and its power supply, and see `toile devices`")]
     NotFound {
-        /// What was looked for.
+        /// The thing that was looked for.
         what: String,
     },
     /// The device went away.
@@ -45,7 +45,7 @@ pub enum TransportError {
     /// An answer did not come in time.
     #[error("{what}: no answer in {} ms", .waited.as_millis())]
     TimedOut {
-        /// What was asked.
+        /// The request.
         what: String,
         /// For how long.
         waited: Duration,
@@ -53,7 +53,7 @@ pub enum TransportError {
     /// The device refused a request.
     #[error("{what}: the device refused it (stall)")]
     Stalled {
-        /// What was asked.
+        /// The request.
         what: String,
     },
     /// This user may not open the video node.
@@ -61,7 +61,7 @@ pub enum TransportError {
     NodePermission {
         /// Device node.
         node: std::path::PathBuf,
-        /// What to do.
+        /// The command.
         advice: String,
     },
     /// A video node could not be opened or driven.
@@ -69,9 +69,9 @@ pub enum TransportError {
     Video {
         /// Device node.
         node: std::path::PathBuf,
-        /// What was tried.
+        /// The attempt.
         action: &'static str,
-        /// What the system said.
+        /// The system's message.
         source: std::io::Error,
     },
     /// The kernel's memory for USB transfers is used up, perhaps by another program.
@@ -80,15 +80,15 @@ pub enum TransportError {
          `echo 64 | sudo tee /sys/module/usbcore/parameters/usbfs_memory_mb`, or close other programs that use cameras"
     )]
     NoMemory {
-        /// What was asked.
+        /// The request.
         what: String,
     },
     /// Anything else that libusb reports.
     #[error("{what}: {source}")]
     Failed {
-        /// What was asked.
+        /// The request.
         what: String,
-        /// What libusb said.
+        /// libusb's message.
         source: rusb::Error,
     },
 }

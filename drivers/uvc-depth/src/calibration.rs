@@ -8,7 +8,7 @@ use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use crate::UvcDepthError;
 
-/// What the file holds (TOML): `name`, `depth_scale` (metres a unit) and a `[camera]` table with `width`, `height`,
+/// The content of the file (TOML): `name`, `depth_scale` (metres a unit) and a `[camera]` table with `width`, `height`,
 /// `fx`, `fy`, `cx`, `cy` and, where the lens bends, `distortion = [k1, k2, p1, p2, k3]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,4 +1,4 @@
-//! What can go wrong with a UVC depth camera.
+//! Errors of a UVC depth camera.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,9 @@ pub enum UvcDepthError {
     #[error(transparent)]
     Transport(#[from] TransportError),
     /// No frame came although the stream is on.
-    #[error("no frame for {0:.1} s; check its cable, and that nothing else on its USB controller streams")]
+    #[error(
+        "the camera sent no frame for {0:.1} s; check its cable, and that nothing else on its USB controller streams"
+    )]
     Silent(f64),
     /// The camera offers no depth format.
     #[error(
@@ -29,7 +31,7 @@ pub enum UvcDepthError {
     Calibration {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         reason: String,
     },
     /// A buffer is too short for its image.

@@ -16,18 +16,18 @@ pub struct ColorCalibration {
     pub color_from_depth: Rigid,
 }
 
-/// What the file holds (TOML): a `[camera]` table with `width`, `height`, `fx`, `fy`, `cx`, `cy` and, where the lens bends,
+/// The content of the file (TOML): a `[camera]` table with `width`, `height`, `fx`, `fy`, `cx`, `cy` and, where the lens bends,
 /// `distortion = [k1, k2, p1, p2, k3]`; and a `[color_from_depth]` table.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     camera: PinholeCamera,
-    color_from_depth: Place,
+    color_from_depth: CameraPosition,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Place {
+struct CameraPosition {
     /// Where the depth camera stands in the webcam's frame, metres.
     position: [f64; 3],
     /// How it is turned there: axis times angle, degrees.
@@ -55,7 +55,7 @@ fn parse(text: &str) -> Result<ColorCalibration, String> {
     if !file.camera.is_valid() {
         return Err("camera: width, height, fx and fy must be positive and every number finite".into());
     }
-    let Place { position, rotation } = file.color_from_depth;
+    let CameraPosition { position, rotation } = file.color_from_depth;
     if !position.iter().all(|v| v.abs() <= MAX_POSITION) {
         return Err(format!(
             "color_from_depth: position is {position:?}, but must be metres, each at most {MAX_POSITION}"

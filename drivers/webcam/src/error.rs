@@ -1,4 +1,4 @@
-//! What can go wrong with a webcam.
+//! Errors of a webcam.
 
 use std::path::PathBuf;
 
@@ -21,7 +21,7 @@ pub enum WebcamError {
     Calibration {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         reason: String,
     },
     /// Its colour cannot be put beside this depth camera.

@@ -1,5 +1,5 @@
 //! The body takes on the scan's own surface: local deformation to the closest compatible points under an elastic
-//! energy (Volino et al.'s V-Man, papers 004 §2.1.2; the mass–spring relaxation is replaced by one sparse solve).
+//! energy (the conformation of the V-Man project, §2.1.2; the mass–spring relaxation is replaced by one sparse solve).
 //! Landmarks that were set by hand carry the body along first (see [`super::radial_basis`]).
 //!
 //! Minimised over the displacement d of all vertices, with vertex areas M and the cotangent Laplacian C:

@@ -1,4 +1,4 @@
-//! Maps by landmarks (Volino et al.'s V-Man, papers 004 §2.1.1): radial basis functions carry the landmarks of the model
+//! Maps by landmarks (the conformation of the V-Man project, §2.1.1): radial basis functions carry the landmarks of the model
 //! to those of the scan, and everything else smoothly along.
 //!
 //! [`radial_basis_map`] is the paper's map of the whole body. [`carried`], the default, acts around landmarks that were

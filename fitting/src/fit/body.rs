@@ -69,7 +69,7 @@ const UPRIGHT: f64 = 1e-9;
 /// up axes are mended with a notice, see [`BodyFit::mend`]). The vertex attribute `filled` (1 where nothing was seen)
 /// lowers trust. Source: Hu et al. 2017, eq. 4, as Gauss–Newton on robust point-to-plane distances in both directions
 /// with analytic derivatives, coarse to fine ([`Method::Toile`]), or as the paper prints it ([`Method::Seed`]).
-/// Landmarks that were set by hand drive the pose, too (papers 000 §3.1). Same result for any number of threads.
+/// Landmarks that were set by hand drive the pose, too (Magnenat-Thalmann et al. 2004, §3.1). Same result for any number of threads.
 ///
 /// # Errors
 /// [`FittingError`] where the mesh cannot be a person or leaves the body undetermined. A fit that should not be
@@ -221,7 +221,7 @@ fn measured(model: &BodyModel, body: &SkinnedMesh, pose: &Pose) -> Measurements 
     measure_extremes(model, &body.posed_mesh(&lifted), stature)
 }
 
-/// What was mended on the scan, in words.
+/// The repairs of the scan, in words.
 fn notices(mut notices: Vec<String>, mend: &Mend) -> Vec<String> {
     if mend.rotation.angle() > UPRIGHT {
         notices.push("the scan does not stand on +Y: it was turned upright".into());

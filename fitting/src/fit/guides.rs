@@ -1,4 +1,5 @@
-//! Landmarks that were set by hand, as terms of the fit (papers 000 §3.1: the joint parameters sought are those that
+//! Landmarks that were set by hand, as terms of the fit (Magnenat-Thalmann et al. 2004, "Modeling of Bodies
+//! and Clothes for Virtual Environments", §3.1: the joint parameters sought are those that
 //! drive the template's skin to the feature points; the difference of the surfaces improves them afterwards).
 
 use nalgebra::{Point3, Vector3};

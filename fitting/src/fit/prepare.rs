@@ -53,7 +53,7 @@ pub(crate) struct Prepared {
     pub scale: f64,
     /// Rotations that may bring it upright, the likeliest first.
     pub ups: Vec<UnitQuaternion<f64>>,
-    /// What was mended, in words.
+    /// The repairs, in words.
     pub notices: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What a body fit decided and how good it is.
+//! The decisions of a body fit, and how good it is.
 
 use std::collections::BTreeMap;
 
@@ -27,14 +27,14 @@ pub struct DistanceStats {
     pub p95_mm: f64,
 }
 
-/// What a body fit decided and how good it is.
+/// The decisions of a body fit, and how good it is.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FitReport {
     /// Whether to trust it.
     pub verdict: Verdict,
     /// Why not, in words; empty where it is trusted.
     pub reasons: Vec<String>,
-    /// What was mended on the scan, in words.
+    /// The repairs of the scan, in words.
     pub notices: Vec<String>,
     /// Gauss–Newton steps over all starts and resolutions.
     pub iterations: usize,

@@ -42,10 +42,10 @@ pub(crate) struct Resolution {
     reverse_cell: f32,
     /// Cell of the body's vertices, metres.
     body_cell: f32,
-    /// Most shape components.
+    /// Maximum number of shape components.
     components: usize,
     turns: Turns,
-    /// Most Gauss–Newton steps.
+    /// Maximum number of Gauss–Newton steps.
     pub iterations: usize,
     gate: Gate,
 }
@@ -83,7 +83,7 @@ const MIDDLE: Resolution = Resolution {
     gate: Gate { distance: 0.05, slip: 0.015, min_cos: 0.6, kernel: 0.010, noise: 0.003, inside: 1.0 },
 };
 
-/// What is left is a finger's thickness; noise and iterations come from the settings.
+/// The error left is a finger's thickness; noise and iterations come from the settings.
 const FINE: Resolution = Resolution {
     scan_cell: 0.006,
     reverse_cell: REVERSE * 0.006,

@@ -31,7 +31,7 @@ const BARELY_SEEN: f64 = 0.3;
 /// brings one of them along.
 const TOO_MANY_DOUBTS: usize = 3;
 
-/// What rules judge.
+/// The figures that rules judge.
 struct Evidence<'a> {
     report: &'a FitReport,
     /// Large regions that were barely seen.
@@ -59,7 +59,7 @@ struct Rule {
     value: fn(&Evidence) -> f64,
     doubtful: Bounds,
     failed: Bounds,
-    /// What to tell people, and what to do.
+    /// The sentence for people, with the remedy.
     reason: fn(&Evidence) -> String,
 }
 

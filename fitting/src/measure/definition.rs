@@ -1,4 +1,4 @@
-//! What a measurement is, in words.
+//! The definition of a measurement, in words.
 
 use serde::{Deserialize, Serialize};
 

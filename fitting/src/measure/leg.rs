@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::measure::{
     definition::{Definition, MeasureKind::*},
     head::height,
-    levels::{Levels, around_trunk, between, farthest_of, longest, shortest},
+    levels::{Levels, around_trunk, between, farthest_of, longest, shortest_tape},
     parts::Side,
     section::{Plane, Tape},
     standing::Standing,
@@ -95,7 +95,7 @@ pub(crate) fn measure(body: &Standing, levels: &Levels, side: Side, taken: &mut 
     taken.add_side(side, &MID_THIGH_GIRTH, level(0.5 * (crotch + knee)));
     taken.add_side(side, &KNEE_GIRTH, level(knee));
     taken.add_side(side, &CALF_GIRTH, longest(&leg, between(knee, ankle, CALF)));
-    taken.add_side(side, &ANKLE_GIRTH, shortest(&leg, between(knee, ankle, ABOVE_ANKLE)));
+    taken.add_side(side, &ANKLE_GIRTH, shortest_tape(&leg, between(knee, ankle, ABOVE_ANKLE)));
     lengths(body, levels, side, taken);
 }
 

@@ -81,7 +81,7 @@ pub(crate) fn longest(skin: &Skin, range: (f64, f64)) -> Option<Tape> {
 }
 
 /// The shortest of the horizontal tapes around `skin` between two levels.
-pub(crate) fn shortest(skin: &Skin, range: (f64, f64)) -> Option<Tape> {
+pub(crate) fn shortest_tape(skin: &Skin, range: (f64, f64)) -> Option<Tape> {
     tapes(skin, range).reduce(|a, b| if b.length < a.length { b } else { a })
 }
 

@@ -17,7 +17,7 @@ pub struct BodyMeasure {
     pub kind: MeasureKind,
     /// Metres: the length of `path`.
     pub value_m: f64,
-    /// What it is: the clause of ISO 8559-1 where there is one, and the definition in words.
+    /// The definition: the clause of ISO 8559-1 where there is one, and the definition in words.
     #[serde(default)]
     pub definition: String,
     /// Where the tape lies on the standing body: corners in metres.

@@ -15,7 +15,7 @@ pub(crate) struct Bound {
     pub lower: f64,
 }
 
-/// The step of least cost that keeps the bounds: `step` is that without them, `factor` that of the normal equations.
+/// The step of minimum cost that keeps the bounds: `step` is that without them, `factor` that of the normal equations.
 ///
 /// Hildreth's method: Gauss–Seidel on the forces of the bounds, in their order.
 pub(crate) fn bounded(mut step: DVector<f64>, factor: &Cholesky<f64, Dyn>, bounds: &[Bound]) -> DVector<f64> {

@@ -21,7 +21,7 @@ pub(crate) trait Problem {
     /// Whether a step over [`Problem::columns`] is too small to go on.
     fn is_small(&self, step: &[f64]) -> bool;
 
-    /// What is being solved for, as an error names it.
+    /// The unknown that is solved for, as an error names it.
     fn solved_for(&self) -> &'static str;
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct Linearised {
     pub equations: NormalEquations,
     /// World position and orientation of each joint: the step turns joints about these.
     pub frames: Vec<Isometry3<f64>>,
-    /// What the step must keep to.
+    /// The bounds that the step must keep to.
     pub bounds: Vec<Bound>,
 }
 

@@ -8,7 +8,7 @@ use super::Residual;
 /// model's misfit are alike over a few centimetres, and a person has some 2,000 patches of 3 cm.
 pub(crate) const INDEPENDENT: f64 = 2000.0;
 
-/// What a pair of points must fulfil, and how it is weighed.
+/// The conditions that a pair of points must fulfil, and how it is weighed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gate {
     /// Largest distance, metres.

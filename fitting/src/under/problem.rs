@@ -21,7 +21,7 @@ const INDEPENDENT_CLOTH: f64 = 50.0;
 const SMALL_STEP: f64 = 2e-4;
 /// Share of a patch that must be uncovered for a vertex in it to count fully is the inverse of this.
 const SURROUNDINGS: f64 = 1.5;
-/// What a match of any colour counts at least: light and shadow change colours too.
+/// The minimum weight of a match of any colour: light and shadow change colours too.
 const ANY_COLOR: f64 = 0.02;
 
 /// Sampling, gate and effort of one resolution.
@@ -134,7 +134,7 @@ impl Problem for UnderProblem<'_> {
 }
 
 impl UnderProblem<'_> {
-    /// What draws each vertex: the scan itself where it is uncovered; where it is covered, the scan's inner side
+    /// The surface that draws each vertex: the scan itself where it is uncovered; where it is covered, the scan's inner side
     /// strongly and the middle of the sleeve a little.
     fn weighed(&self, relations: Vec<Option<Relation>>) -> Vec<Residual> {
         let Sampled { body, settings, gate, .. } = self.sampled;

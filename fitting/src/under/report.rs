@@ -1,4 +1,4 @@
-//! What a fit under a scan decided and how good it is.
+//! The decisions of a fit under a scan, and how good it is.
 
 use serde::{Deserialize, Serialize};
 use toile_character::Pose;
@@ -18,11 +18,11 @@ pub struct UnderFit {
     pub pose: Pose,
     /// For each vertex of the mesh: how surely it is uncovered skin or cloth of before, 0–1.
     pub uncovered: Vec<f32>,
-    /// What was decided and how good it is.
+    /// The decisions, and how good the result is.
     pub report: UnderReport,
 }
 
-/// What a fit under a scan decided.
+/// The decisions of a fit under a scan.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct UnderReport {
     /// Whether to trust it.

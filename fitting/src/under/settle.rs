@@ -18,11 +18,11 @@ pub struct SettledBody {
     pub pose: Pose,
     /// The body in that pose and the scan's frame, drawn inside the scan; template topology.
     pub mesh: Mesh,
-    /// What was done.
+    /// The actions taken.
     pub report: SettleReport,
 }
 
-/// What settling the body moved.
+/// The moves of settling the body.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SettleReport {
     /// Largest turn of an arm's joint or wrist, degrees.
@@ -73,7 +73,7 @@ pub fn settle_under(
     Ok(SettledBody { pose: turned, mesh, report })
 }
 
-/// What was moved from `posed` to `points`, and what still lies outside.
+/// The moves from `posed` to `points`, and the vertices that still lie outside.
 fn report(
     model: &BodyModel,
     inside: &Inside,

@@ -15,7 +15,7 @@ const BELIEVED: f64 = 0.5;
 /// earlier take is passed over.
 ///
 /// # Errors
-/// What `fit_as` says of the last take. `takes` must be 1 or more.
+/// The result of `fit_as` for the last take. `takes` must be 1 or more.
 pub fn pose_as_worn<E>(
     takes: usize,
     mut fit_as: impl FnMut(usize) -> Result<UnderFit, E>,

@@ -59,7 +59,7 @@ pub fn person(model: &BodyModel, seed: u64, heading: f64) -> Person {
     Person { beta, pose, mesh }
 }
 
-/// What a scanner sees of it: no soles, no inner pockets, `noise` metres along the normals.
+/// The part that a scanner sees: no soles, no inner pockets, `noise` metres along the normals.
 pub fn scanned(model: &BodyModel, person: &Person, noise: f64, seed: u64) -> Mesh {
     let mut numbers = Numbers(seed);
     let floor = person.mesh.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);

@@ -34,7 +34,7 @@ pub fn read(model: &BodyModel, bytes: &[u8]) -> Vec<SkinnedMesh> {
 
 /// A pose that somebody may stand in on a turntable, `wild` times as varied as usual: arms between hanging and the
 /// T-pose, elbows, knees and head turned, any heading.
-pub fn stance(body: &SkinnedMesh, numbers: &mut Numbers, wild: f64) -> Pose {
+pub fn random_pose(body: &SkinnedMesh, numbers: &mut Numbers, wild: f64) -> Pose {
     let mut pose = Pose::identity();
     for joint in JOINTS {
         *pose.rotation_mut(joint) = UnitQuaternion::from_scaled_axis(numbers.vector() * wild * 5f64.to_radians());
@@ -59,7 +59,7 @@ pub fn stance(body: &SkinnedMesh, numbers: &mut Numbers, wild: f64) -> Pose {
     pose.moved(&Isometry3::new(numbers.vector() * 0.15, heading), &body.skeleton)
 }
 
-/// What a turntable scan shows of a posed body: no soles, no pockets, patches missing until `missing` of the surface
+/// The part of a posed body that a turntable scan shows: no soles, no pockets, patches missing until `missing` of the surface
 /// is gone, `noise` metres along the normals.
 pub fn scanned(model: &BodyModel, body: &Mesh, missing: f64, noise: f64, numbers: &mut Numbers) -> Mesh {
     let floor = body.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);

@@ -1,7 +1,7 @@
 //! Tapes by brute force: another way to the same lengths, for comparison with the library's.
 //!
 //! The length of a taut tape around points of a plane is the integral of their support function over all directions
-//! (Cauchy's formula). Parts of the body are told apart by skin weights, not by the template's regions.
+//! (Cauchy's formula). Parts of the body are distinguished by skin weights, not by the template's regions.
 
 use std::f64::consts::TAU;
 
@@ -34,13 +34,13 @@ impl BruteForce<'_> {
         joints.filter(|(j, _)| Joint::from_index(usize::from(*j)).is_some_and(&of)).map(|(_, w)| w).sum()
     }
 
-    /// What moves less with the arms and the head than with the rest.
+    /// The part that moves less with the arms and the head than with the rest.
     pub fn without_arms(&self) -> Keep {
         let is_arm = |j: Joint| is_in(j, Joint::LeftUpperArm) || is_in(j, Joint::RightUpperArm);
         (0..self.model.vertex_count()).map(|v| self.share(v, is_arm) < 0.5).collect()
     }
 
-    /// What moves more with one leg than with the other.
+    /// The part that moves more with one leg than with the other.
     pub fn leg(&self, side: &str) -> Keep {
         let (own, other) = match side {
             "left" => (Joint::LeftUpperLeg, Joint::RightUpperLeg),
@@ -50,7 +50,7 @@ impl BruteForce<'_> {
         (0..self.model.vertex_count()).map(more).collect()
     }
 
-    /// What moves mostly with one arm.
+    /// The part that moves mostly with one arm.
     pub fn arm(&self, side: &str) -> Keep {
         let upper = if side == "left" { Joint::LeftUpperArm } else { Joint::RightUpperArm };
         (0..self.model.vertex_count()).map(|v| self.share(v, |j| is_in(j, upper)) >= 0.5).collect()

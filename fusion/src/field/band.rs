@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     FusionError,
-    frame::{View, dot},
+    frame::{DepthView, dot},
 };
 
 /// Makes the blocks within the truncation band of the view's elements where they are missing. Returns for each block of the
@@ -23,7 +23,7 @@ use crate::{
 /// [`FusionError::TooLarge`] where the block index would not fit.
 pub(crate) fn touch(
     tsdf: &mut Tsdf,
-    view: &View,
+    view: &DepthView,
     model_from_camera: &Rigid,
     projection: &Projection<'_>,
 ) -> Result<Vec<bool>, FusionError> {
@@ -63,7 +63,7 @@ struct Rays<'a> {
 }
 
 impl<'a> Rays<'a> {
-    fn new(tsdf: &Tsdf, view: &View, model_from_camera: &Rigid, projection: &Projection<'a>) -> Self {
+    fn new(tsdf: &Tsdf, view: &DepthView, model_from_camera: &Rigid, projection: &Projection<'a>) -> Self {
         let block = tsdf.voxel_size() * SIDE as f32;
         let turn = model_from_camera.rotation.to_rotation_matrix();
         let rotation = std::array::from_fn(|k| std::array::from_fn(|j| turn[(k, j)] as f32 / block));
@@ -107,13 +107,13 @@ impl<'a> Rays<'a> {
 }
 
 /// Which pixels are to be fused.
-struct Seen {
+struct Visible {
     /// Groups of lanes in a row.
     groups: usize,
     bits: Vec<u16>,
 }
 
-impl Seen {
+impl Visible {
     /// Which pixels of a group are sampled: those on every `stride`-th row and column, and those beside something
     /// that is not seen, so that rims do not depend on where rows and columns lie.
     #[inline(always)]
@@ -143,7 +143,7 @@ impl Seen {
 struct Survey<'a>(&'a Rays<'a>);
 
 impl Kernel for Survey<'_> {
-    type Output = (Option<[[i32; 3]; 2]>, Seen);
+    type Output = (Option<[[i32; 3]; 2]>, Visible);
 
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Self::Output {
@@ -178,7 +178,7 @@ impl Kernel for Survey<'_> {
             bounds[0][k] = floor(least + rays.origin[k]) - 1;
             bounds[1][k] = floor(most + rays.origin[k]) + 1;
         }
-        (any.then_some(bounds), Seen { groups, bits })
+        (any.then_some(bounds), Visible { groups, bits })
     }
 }
 
@@ -201,7 +201,7 @@ impl Grid {
 struct Mark<'a> {
     rays: &'a Rays<'a>,
     grid: &'a Grid,
-    seen: &'a Seen,
+    seen: &'a Visible,
 }
 
 impl Kernel for Mark<'_> {

@@ -14,7 +14,7 @@ use super::{
     projection::Projection,
     tsdf::Tsdf,
 };
-use crate::{FusionError, frame::View};
+use crate::{FusionError, frame::DepthView};
 
 /// Blocks of a parallel task.
 const CHUNK: usize = 32;
@@ -27,7 +27,7 @@ const HALF_BLOCK: f32 = 0.5 * (SIDE - 1) as f32;
 ///
 /// # Errors
 /// [`FusionError::TooLarge`] where the block index would not fit.
-pub fn integrate(tsdf: &mut Tsdf, view: &View, model_from_camera: &Rigid) -> Result<Touched, FusionError> {
+pub fn integrate(tsdf: &mut Tsdf, view: &DepthView, model_from_camera: &Rigid) -> Result<Touched, FusionError> {
     let projection = Projection::new(tsdf, view, model_from_camera);
     let touched = touch(tsdf, view, model_from_camera, &projection)?;
     let (coords, touched, projection) = (&tsdf.coords, &touched, &projection);
@@ -90,7 +90,7 @@ mod tests {
     use crate::field::block::{VOXELS, local_index};
 
     /// A slanted wall with a hole, seen from a turned camera.
-    fn wall(focal: f64) -> (View, Rigid) {
+    fn wall(focal: f64) -> (DepthView, Rigid) {
         let camera = PinholeCamera::ideal(120, 90, focal, focal, 59.5, 44.5);
         let depth = |i: usize| {
             let (u, v) = (i % 120, i / 120);
@@ -100,7 +100,7 @@ mod tests {
         };
         let depth: Vec<f32> = (0..120 * 90).map(depth).collect();
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.2, 2.4, -0.3));
-        (View::new(&camera, &depth, 2), Rigid::from_parts(Translation3::new(0.4, 0.9, -0.2), turn))
+        (DepthView::new(&camera, &depth, 2), Rigid::from_parts(Translation3::new(0.4, 0.9, -0.2), turn))
     }
 
     /// Every voxel of touched blocks about which a pixel says something within the band is updated: compared with a plain

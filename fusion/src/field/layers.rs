@@ -1,4 +1,4 @@
-//! What the pixels of a view say about the voxels of an octant, one layer of sixteen at a time.
+//! The voxels of an octant by the pixels of a view, one layer of sixteen at a time.
 
 use std::array::from_fn;
 
@@ -22,7 +22,7 @@ const NEAR: f32 = 0.1;
 // The lanes are one layer of an octant.
 const _: () = assert!(OCTANT * OCTANT == LANES);
 
-/// What an integration touched.
+/// The voxels that an integration touched.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Touched {
     /// Voxels of the slabs (half octants) in the frame's truncation band.
@@ -53,7 +53,7 @@ pub(crate) struct Layers<'a, L: Lanes> {
     width: L::F,
     center: [L::F; 2],
     pitch: [L::F; 2],
-    /// The truncation distance and its opposite, metres; farther before the surface than `far` its slant says nothing.
+    /// The truncation distance and its opposite, metres; farther before the surface than `far` its root says nothing.
     truncation: [L::F; 2],
     far: L::F,
     nearest: L::F,
@@ -68,8 +68,8 @@ type Points<L> = [<L as Lanes>::F; 3];
 /// The colours of a block, and those of the view's pixels.
 pub(crate) type Colors<'a> = (&'a mut ColorBlock, &'a [[u8; 4]]);
 
-/// What all voxels of a block share.
-struct Place<P, L: Lanes> {
+/// Shared by all voxels of a block.
+struct BlockView<P, L: Lanes> {
     pixels: P,
     /// Inverse depth of the block's centre, from which those of its voxels follow unless it is too near.
     guess: Option<L::F>,
@@ -78,7 +78,7 @@ struct Place<P, L: Lanes> {
 }
 
 /// Where a layer's voxels are seen.
-struct Seen<L: Lanes> {
+struct LookUp<L: Lanes> {
     /// Their pixels, counted from the first of the page.
     index: [u32; LANES],
     /// Inverse depth.
@@ -87,7 +87,7 @@ struct Seen<L: Lanes> {
     aside: [L::F; 2],
 }
 
-/// What the pixels of a layer say about its voxels.
+/// The values that the pixels of a layer give to its voxels.
 struct Measured<L: Lanes> {
     /// In units of the field.
     distance: L::F,
@@ -139,7 +139,7 @@ impl<'a, L: Lanes> Layers<'a, L> {
     ) -> Touched {
         let l = self.lanes;
         let guess = (self.projection.block_radius < NEAR * depth).then(|| l.splat(1.0 / depth));
-        let place = Place { pixels, guess, offset: l.splat(pixels.first() as f32) };
+        let place = BlockView { pixels, guess, offset: l.splat(pixels.first() as f32) };
         let slabs = self.slabs_in_band(&place, at);
         let [x, y, z] = self.steps;
         let mut updated = 0;
@@ -162,7 +162,7 @@ impl<'a, L: Lanes> Layers<'a, L> {
     /// The slabs of a block in the truncation band, bit by bit: of each octant, in their order, the lower and the upper half.
     /// Looked at are the centres of its cells of 2³ voxels, with room for the voxels around them.
     #[inline(always)]
-    fn slabs_in_band<P: Pixels>(&self, place: &Place<P, L>, at: [i32; 3]) -> u16 {
+    fn slabs_in_band<P: Pixels>(&self, place: &BlockView<P, L>, at: [i32; 3]) -> u16 {
         let (l, p) = (self.lanes, self.projection);
         let mut slabs = 0;
         for pair in 0..4 {
@@ -171,12 +171,12 @@ impl<'a, L: Lanes> Layers<'a, L> {
             let [x, y, z] = self.cells;
             let points = [l.add(l.splat(start[0]), x), l.add(l.splat(start[1]), y), l.add(l.splat(start[2]), z)];
             let seen = self.look_up(&points, place.guess, place.offset);
-            let [depth, facing, nx, ny] = l.unpack(place.pixels.fetch(p.elements, &seen.index));
-            let to_plane = self.to_plane(l.sub(depth, points[2]), facing, [nx, ny], &points, &seen);
+            let [depth, slant, nx, ny] = l.unpack(place.pixels.fetch(p.elements, &seen.index));
+            let to_plane = self.to_plane(l.sub(depth, points[2]), slant, [nx, ny], &points, &seen);
             // Half a pixel further the plane is so much nearer or farther.
             let tilt = l.add(l.mul(l.abs(nx), self.pitch[0]), l.mul(l.abs(ny), self.pitch[1]));
             let room = l.add(self.cell_radius, l.mul(l.splat(0.5), l.mul(points[2], tilt)));
-            let band = l.sub(room, l.mul(facing, self.truncation[0]));
+            let band = l.sub(room, l.mul(slant, self.truncation[0]));
             let bits = l.bits(l.and(l.ge(band, l.abs(to_plane)), l.ge(depth, self.nearest)));
             // A slab is four cells.
             let any = bits | bits >> 1;
@@ -190,7 +190,7 @@ impl<'a, L: Lanes> Layers<'a, L> {
     #[inline(always)]
     fn update_row<P: Pixels>(
         &self,
-        place: &Place<P, L>,
+        place: &BlockView<P, L>,
         layer: usize,
         points: &Points<L>,
         block: &mut Block,
@@ -212,10 +212,10 @@ impl<'a, L: Lanes> Layers<'a, L> {
         LANES
     }
 
-    /// What lies outside the image is seen on its border, which is empty. From a guess, two of Newton's steps are exact to
+    /// Points outside the image are seen on its border, which is empty. From a guess, two of Newton's steps are exact to
     /// the fourth power of half a block's share of the depth: a thirtieth of a pixel at worst.
     #[inline(always)]
-    fn look_up(&self, [x, y, z]: &Points<L>, guess: Option<L::F>, offset: L::F) -> Seen<L> {
+    fn look_up(&self, [x, y, z]: &Points<L>, guess: Option<L::F>, offset: L::F) -> LookUp<L> {
         let (l, zero, one, two) = (self.lanes, self.lanes.splat(0.0), self.lanes.splat(1.0), self.lanes.splat(2.0));
         let inverse = match guess {
             Some(guess) => {
@@ -229,28 +229,28 @@ impl<'a, L: Lanes> Layers<'a, L> {
         let v = l.round(l.min(l.max(exact[1], zero), self.last[1]));
         let index = l.indices(l.add(l.mul(v, self.width), l.sub(u, offset)));
         let aside = [l.mul(l.sub(exact[0], u), self.pitch[0]), l.mul(l.sub(exact[1], v), self.pitch[1])];
-        Seen { index, inverse, aside }
+        LookUp { index, inverse, aside }
     }
 
     /// Signed distances to the planes of the elements.
     #[inline(always)]
-    fn to_plane(&self, ahead: L::F, facing: L::F, n: [L::F; 2], points: &Points<L>, seen: &Seen<L>) -> L::F {
+    fn to_plane(&self, ahead: L::F, slant: L::F, n: [L::F; 2], points: &Points<L>, seen: &LookUp<L>) -> L::F {
         let l = self.lanes;
         let aside = l.add(l.mul(n[0], seen.aside[0]), l.mul(n[1], seen.aside[1]));
-        l.sub(l.mul(points[2], aside), l.mul(facing, ahead))
+        l.sub(l.mul(points[2], aside), l.mul(slant, ahead))
     }
 
     /// Signed distances to the planes of the elements, capped, and their weights.
     #[inline(always)]
-    fn measure(&self, elements: [[Element; LANES / 2]; 2], points: &Points<L>, seen: &Seen<L>) -> Measured<L> {
+    fn measure(&self, elements: [[Element; LANES / 2]; 2], points: &Points<L>, seen: &LookUp<L>) -> Measured<L> {
         let (l, z, [t, minus_t]) = (self.lanes, points[2], self.truncation);
-        let [depth, facing, nx, ny] = l.unpack(elements);
+        let [depth, slant, nx, ny] = l.unpack(elements);
         let ahead = l.sub(depth, z);
-        let to_plane = self.to_plane(ahead, facing, [nx, ny], points, seen);
+        let to_plane = self.to_plane(ahead, slant, [nx, ny], points, seen);
         let distance = l.select(l.ge(ahead, self.far), t, l.max(l.min(to_plane, t), minus_t));
         let counts = l.and(l.ge(ahead, minus_t), l.ge(depth, self.nearest));
-        let slant = l.mul(facing, seen.inverse);
-        let weight = l.mul(l.mul(slant, slant), l.splat(WEIGHT_ONE));
+        let root = l.mul(slant, seen.inverse);
+        let weight = l.mul(l.mul(root, root), l.splat(WEIGHT_ONE));
         let weight = l.min(l.max(weight, l.splat(1.0)), l.splat(4.0 * WEIGHT_ONE));
         Measured { distance: l.mul(distance, self.scale), weight: l.keep(counts, weight), counts }
     }

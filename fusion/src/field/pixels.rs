@@ -11,7 +11,7 @@ pub(crate) trait Pixels: Copy {
     /// Index of the pixel that they are counted from.
     fn first(self) -> usize;
 
-    /// What stands at these places, in halves.
+    /// The values at these places, in halves.
     fn fetch<T: Copy>(self, image: &[T], index: &[u32; LANES]) -> [[T; LANES / 2]; 2];
 }
 

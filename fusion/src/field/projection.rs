@@ -3,7 +3,7 @@
 use toile_geometry::{Rigid, element::Element};
 
 use super::{block::SIDE, tsdf::Tsdf};
-use crate::frame::{PAGE, View};
+use crate::frame::{DepthView, PAGE};
 
 /// Voxels nearer to the camera than this are not updated, metres.
 const NEAREST: f32 = 0.02;
@@ -30,7 +30,7 @@ pub(crate) struct Projection<'a> {
 }
 
 impl<'a> Projection<'a> {
-    pub(crate) fn new(tsdf: &Tsdf, view: &'a View, model_from_camera: &Rigid) -> Self {
+    pub(crate) fn new(tsdf: &Tsdf, view: &'a DepthView, model_from_camera: &Rigid) -> Self {
         let camera_from_model = model_from_camera.inverse();
         let rotation = camera_from_model.rotation.to_rotation_matrix();
         let (voxel, camera) = (tsdf.voxel_size(), &view.camera);

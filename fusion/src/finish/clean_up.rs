@@ -24,11 +24,11 @@ const SOLE_HEIGHT: f32 = 0.025;
 const SOLE_EDGE: f32 = 0.008;
 
 /// A loose piece of at least this share of the largest one's area belongs to the subject: a hand below a wide sleeve has 1 to 2 %.
-const LEAST_PIECE: f64 = 0.008;
+const MIN_PIECE: f64 = 0.008;
 /// A loose piece lower than this is a remnant of the disk, metres.
 const FLAT: f32 = 0.06;
 
-/// What the clean-up did.
+/// The effect of the clean-up.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cleaned {
     /// Loose pieces removed.
@@ -83,7 +83,7 @@ pub fn clean_up(mut raw: Mesh, settings: &FusionSettings, cut: Option<f32>) -> (
 /// The largest piece, and others that are large and no flat remains of a disk: legs below a skirt, hands below sleeves.
 fn subject_pieces(pieces: &[Piece]) -> Vec<bool> {
     let largest = pieces.iter().map(|p| p.area).fold(0.0, f64::max);
-    let belongs = |p: &Piece| p.area >= largest || (p.area > LEAST_PIECE * largest && p.high.y - p.low.y > FLAT);
+    let belongs = |p: &Piece| p.area >= largest || (p.area > MIN_PIECE * largest && p.high.y - p.low.y > FLAT);
     pieces.iter().map(belongs).collect()
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use toile_geometry::{Rigid, statistics::median, transform_point};
 
 use crate::{
-    frame::{View, dot},
+    frame::{DepthView, dot},
     tracking::{NormalEquations, Sample, hold_open_directions, increment, samples},
 };
 
@@ -18,7 +18,7 @@ const POINTS: usize = 1500;
 /// Points of a frame used to find out who overlaps whom.
 const PROBES: usize = 150;
 /// Smallest share of probes that a partner must see.
-const LEAST_OVERLAP: f64 = 0.4;
+const MIN_OVERLAP: f64 = 0.4;
 /// Index distances of pairs along the way.
 const STRIDES: [usize; 7] = [1, 2, 3, 5, 8, 13, 21];
 /// Of farther pairs (across the seam, or back at a place seen before) one in this many is used.
@@ -26,7 +26,7 @@ const SEAM_THINNING: usize = 3;
 /// Distance gate of the first and of the last round, metres.
 const GATES: (f64, f64) = (0.04, 0.012);
 
-/// What the optimisation did.
+/// The result of the optimisation.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Closing {
     /// Frame pairs used.
@@ -43,12 +43,12 @@ pub struct Closing {
 
 /// A frame of the optimisation.
 struct Node<'a> {
-    view: &'a View,
+    view: &'a DepthView,
     points: Vec<Sample>,
 }
 
 /// Optimises `poses` (model_from_camera of each view, in the order of time) together. The first pose stays.
-pub fn close(views: &[View], poses: &mut [Rigid], rounds: usize) -> Closing {
+pub fn close(views: &[DepthView], poses: &mut [Rigid], rounds: usize) -> Closing {
     let nodes: Vec<Node> = views.par_iter().map(|view| Node { view, points: samples(view, POINTS) }).collect();
     let center = subject_center(&nodes, poses);
     let pairs = overlapping_pairs(&nodes, poses);
@@ -121,7 +121,7 @@ fn pair_system(
 
 /// Point-to-plane residual, normal and weight of a camera-frame point against the pixel it falls on.
 #[inline]
-fn match_pixel(view: &View, p: &Point3<f32>, normal: [f32; 3], gate: f32) -> Option<(f64, [f32; 3], f32)> {
+fn match_pixel(view: &DepthView, p: &Point3<f32>, normal: [f32; 3], gate: f32) -> Option<(f64, [f32; 3], f32)> {
     if p.z < 0.05 {
         return None;
     }
@@ -149,8 +149,8 @@ fn overlapping_pairs(nodes: &[Node], poses: &[Rigid]) -> Vec<(usize, usize)> {
     let all: Vec<(usize, usize)> =
         (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))).filter(|&(i, j)| wanted(i, j)).collect();
     let overlaps = |&&(i, j): &&(usize, usize)| {
-        let facing = poses[i].rotation.inverse() * poses[j].rotation;
-        if facing.angle() > 1.3 {
+        let turn = poses[i].rotation.inverse() * poses[j].rotation;
+        if turn.angle() > 1.3 {
             return false;
         }
         let b_from_a = poses[j].inverse() * poses[i];
@@ -162,7 +162,7 @@ fn overlapping_pairs(nodes: &[Node], poses: &[Rigid]) -> Vec<(usize, usize)> {
             let normal = turn * nalgebra::Vector3::from(s.normal);
             match_pixel(nodes[j].view, &transform_point(&b_from_a, &s.point), normal.into(), 0.05).is_some()
         });
-        seen.count() as f64 >= LEAST_OVERLAP * total.max(1) as f64
+        seen.count() as f64 >= MIN_OVERLAP * total.max(1) as f64
     };
     all.par_iter().filter(overlaps).copied().collect()
 }

@@ -6,13 +6,13 @@ use toile_capture::Sensor;
 use crate::{
     FusionError,
     field::{Tsdf, integrate},
-    frame::{View, decode_color},
+    frame::{DepthView, decode_color},
     take::Fuser,
     tracking::KeptFrame,
 };
 
 /// Frames whose colours are used at most.
-const MOST_COLORED: usize = 200;
+const MAX_COLORED: usize = 200;
 /// Frames that are prepared together.
 const GROUP: usize = 16;
 
@@ -43,12 +43,12 @@ pub(crate) fn fuse_again(fuser: &mut Fuser, frames: &[usize], with_color: bool) 
     let with_color = with_color && fuser.kept.has_color();
     let mut field = fuser.model.empty_field(with_color);
     let window = fuser.model.window;
-    let colored = fuser.kept.len().div_ceil(MOST_COLORED).max(1);
+    let colored = fuser.kept.len().div_ceil(MAX_COLORED).max(1);
     let (kept, sensor, clock) = (&fuser.kept.frames, &fuser.sensor, &mut fuser.clock);
     let step = if with_color { "integrate with colour" } else { "integrate again" };
     for group in frames.chunks(GROUP) {
         let view = |&i: &usize| colored_view(&kept[i], sensor, window, with_color && i.is_multiple_of(colored));
-        let views: Vec<View> = clock.time("prepare again", || group.par_iter().map(view).collect());
+        let views: Vec<DepthView> = clock.time("prepare again", || group.par_iter().map(view).collect());
         for (&i, view) in group.iter().zip(&views) {
             clock.time(step, || integrate(&mut field, view, &kept[i].model_from_camera))?;
         }
@@ -56,7 +56,7 @@ pub(crate) fn fuse_again(fuser: &mut Fuser, frames: &[usize], with_color: bool) 
     Ok(field)
 }
 
-fn colored_view(kept: &KeptFrame, sensor: &Sensor, window: usize, with_color: bool) -> View {
+fn colored_view(kept: &KeptFrame, sensor: &Sensor, window: usize, with_color: bool) -> DepthView {
     let mut view = kept.depth.view(window);
     if let Some(image) = decode_color(kept.color.as_ref(), kept.index).filter(|_| with_color) {
         view.add_colors(&image, sensor);

@@ -7,16 +7,16 @@ use toile_geometry::Rigid;
 use super::{closing::close, fuse_again::fuse_again};
 use crate::{
     FusionError,
-    frame::View,
+    frame::DepthView,
     report::FusionReport,
     take::Fuser,
     tracking::{DEGENERATE, Kept, register, samples},
 };
 
 /// Frames in the joint optimisation at most; of more, evenly spaced ones.
-const MOST_CLOSED: usize = 100;
+const MAX_CLOSED: usize = 100;
 /// Frames in a round of refinement at most.
-const MOST_REFINED: usize = 200;
+const MAX_REFINED: usize = 200;
 /// Points of a frame that is registered to the whole.
 const POINTS: usize = 6000;
 
@@ -26,9 +26,9 @@ pub(crate) fn close_turn(fuser: &mut Fuser, report: &mut FusionReport) {
     if rounds == 0 {
         return;
     }
-    let keys = fuser.kept.key_frames(MOST_CLOSED);
+    let keys = fuser.kept.key_frames(MAX_CLOSED);
     let (kept, window) = (&fuser.kept, fuser.model.window);
-    let views: Vec<View> = keys.par_iter().map(|&i| kept.frames[i].depth.view(window)).collect();
+    let views: Vec<DepthView> = keys.par_iter().map(|&i| kept.frames[i].depth.view(window)).collect();
     let mut poses: Vec<Rigid> = keys.iter().map(|&i| kept.frames[i].model_from_camera).collect();
     let closing = fuser.clock.time("close", || close(&views, &mut poses, rounds));
     report.closing_pairs = closing.pairs;
@@ -43,7 +43,7 @@ pub(crate) fn close_turn(fuser: &mut Fuser, report: &mut FusionReport) {
 /// # Errors
 /// [`FusionError::TooLarge`] where the field outgrows its index.
 pub(crate) fn refine(fuser: &mut Fuser) -> Result<(), FusionError> {
-    let keys = fuser.kept.key_frames(MOST_REFINED);
+    let keys = fuser.kept.key_frames(MAX_REFINED);
     let field = fuse_again(fuser, &keys, false)?;
     let (kept, window) = (&fuser.kept, fuser.model.window);
     let registered = |&i: &usize| {

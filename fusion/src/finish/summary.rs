@@ -1,6 +1,6 @@
-//! What the report and the timings say in the end.
+//! The final report and timings.
 
-use toile_geometry::lanes::instruction_set;
+use toile_geometry::{lanes::instruction_set, statistics::median};
 
 use crate::{
     drop_reason::DropReason,
@@ -16,7 +16,7 @@ const LYING_DEG: f64 = 45.0;
 /// A seam wider than this means that the subject moved, millimetres.
 const OPEN_SEAM_MM: f64 = 5.0;
 
-/// What the report says about the final field.
+/// Figures of the final field, for the report.
 pub(crate) struct FieldSize {
     pub blocks: usize,
     pub bytes: usize,
@@ -46,9 +46,8 @@ pub(crate) fn summarise(fuser: &mut Fuser, field: &FieldSize, report: &mut Fusio
 fn summarise_tracking(fuser: &Fuser, report: &mut FusionReport) {
     let tracked = || fuser.kept.frames.iter().filter_map(|k| k.tracked);
     let mut residuals: Vec<f64> = tracked().map(|t| t.residual * 1e3).collect();
-    residuals.sort_unstable_by(f64::total_cmp);
-    report.residual_mm = residuals.get(residuals.len() / 2).copied().unwrap_or(0.0);
-    report.residual_max_mm = residuals.last().copied().unwrap_or(0.0);
+    report.residual_max_mm = residuals.iter().copied().max_by(f64::total_cmp).unwrap_or(0.0);
+    report.residual_mm = median(&mut residuals).unwrap_or(0.0);
     report.conditioning_least = tracked().map(|t| t.conditioning).min_by(f64::total_cmp).unwrap_or(0.0);
     report.frames_by_color = tracked().filter(|t| t.by_color).count();
 }
@@ -73,7 +72,7 @@ fn warnings(report: &FusionReport) -> Vec<String> {
         list.push(format!("the scan is made from the rig's first sensor alone: the depth of `{names}` is not used"));
     }
     if report.volume.is_some() && !report.full_turn && report.turned_deg > 0.0 {
-        list.push(format!("no full turn: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));
+        list.push(format!("the turn is not full: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));
     }
     if report.volume.as_ref().is_some_and(|v| !v.floor_found) && report.axis_tilt_deg.is_some_and(|t| t > LYING_DEG) {
         list.push(

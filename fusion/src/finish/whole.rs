@@ -18,11 +18,11 @@ use crate::{
 };
 
 /// Weight units that make a voxel surface: two frames at the most grazing angle.
-const LEAST_WEIGHT: u16 = 2;
+const MIN_WEIGHT: u16 = 2;
 /// The same for each frame of a subject that turns before a resting camera, which sees every place in a fixed share of the
 /// frames: one frame in fifty at the most grazing angle. Flying pixels and the noise over the disk come with every frame,
 /// so the weight that makes a surface must grow with the number of frames.
-const LEAST_WEIGHT_A_FRAME: f64 = 0.02;
+const MIN_WEIGHT_A_FRAME: f64 = 0.02;
 
 /// Closes the turn, fuses everything again and makes the scan.
 ///
@@ -73,9 +73,9 @@ fn check_enough_frames(fuser: &Fuser) -> Result<(), FusionError> {
 /// The raw surface, model frame.
 fn extract(fuser: &mut Fuser, field: Tsdf) -> Result<Mesh, FusionError> {
     let turning = fuser.volume.is_some();
-    let least_weight = least_weight(&fuser.settings, turning, fuser.kept.len());
+    let minimum_weight = minimum_weight(&fuser.settings, turning, fuser.kept.len());
     let raw = fuser.clock.time("extract", || {
-        let crossings = crossings(&field, least_weight);
+        let crossings = crossings(&field, minimum_weight);
         drop(field);
         tidy(&crossings)
     });
@@ -86,10 +86,10 @@ fn extract(fuser: &mut Fuser, field: Tsdf) -> Result<Mesh, FusionError> {
 }
 
 /// Weight units that make a voxel surface. A hand-held camera sees a place in a few of its frames only.
-pub(crate) fn least_weight(settings: &FusionSettings, is_cut_out: bool, frames: usize) -> u16 {
+pub(crate) fn minimum_weight(settings: &FusionSettings, is_cut_out: bool, frames: usize) -> u16 {
     let turning = is_cut_out && settings.prior == Prior::Turntable;
-    let share = if turning { (LEAST_WEIGHT_A_FRAME * frames as f64) as u16 } else { 0 };
-    share.max(LEAST_WEIGHT)
+    let share = if turning { (MIN_WEIGHT_A_FRAME * frames as f64) as u16 } else { 0 };
+    share.max(MIN_WEIGHT)
 }
 
 fn clean(fuser: &mut Fuser, mesh: Mesh, report: &mut FusionReport) -> Mesh {

@@ -2,7 +2,7 @@
 
 use toile_geometry::camera::PinholeCamera;
 
-use super::view::View;
+use super::view::DepthView;
 
 /// Filtered depth of the used part of an image, compact enough to keep a whole take.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,8 +52,8 @@ impl CutDepth {
     }
 
     /// Surface elements from normals averaged over `window` pixels to each side, without colour.
-    pub fn view(&self, window: usize) -> View {
-        View::new(&self.camera, &self.meters(), window)
+    pub fn view(&self, window: usize) -> DepthView {
+        DepthView::new(&self.camera, &self.meters(), window)
     }
 }
 

@@ -49,10 +49,10 @@ impl Kernel for SurfaceElements<'_> {
             for x in (0..width).step_by(LANES) {
                 let at = smooth.at(x, y);
                 if l.any(l.gt(l.load(&group(&smooth.values, at)), l.splat(0.0))) {
-                    let [facing, nx, ny] = normals(l, &smooth, at, &rays, x, y);
+                    let [slant, nx, ny] = normals(l, &smooth, at, &rays, x, y);
                     let measured = l.load(&group(&depth.values, at));
-                    let depth = l.keep(l.gt(l.splat(0.0), facing), measured);
-                    put_group(row, x, l.pack([depth, facing, nx, ny]));
+                    let depth = l.keep(l.gt(l.splat(0.0), slant), measured);
+                    put_group(row, x, l.pack([depth, slant, nx, ny]));
                 }
             }
             if let [first, .., last] = row {
@@ -159,13 +159,13 @@ fn normals<L: Lanes>(l: L, smooth: &Padded, at: usize, rays: &Rays, x: usize, y:
     let n = cross(l, dv, du);
     let length = l.sqrt(squared(l, n));
     let inverse = l.div(one, l.max(length, l.splat(1e-12)));
-    let facing = l.mul(l.add(l.add(l.mul(n[0], rx), l.mul(n[1], ry)), n[2]), inverse);
+    let slant = l.mul(l.add(l.add(l.mul(n[0], rx), l.mul(n[1], ry)), n[2]), inverse);
     let cosine = l.mul(l.sqrt(squared(l, [rx, ry, one])), l.splat(-MIN_COSINE));
     let spans = l.and(l.and(has_across, has_down), l.gt(d, l.splat(0.0)));
-    let good = l.and(spans, l.and(l.ge(cosine, facing), l.gt(length, l.splat(1e-12))));
+    let good = l.and(spans, l.and(l.ge(cosine, slant), l.gt(length, l.splat(1e-12))));
     // Elements hold facings down to −2: rays of more than 60° aside do not count for more.
-    let facing = l.max(facing, l.splat(-2.0));
-    [l.keep(good, facing), l.keep(good, l.mul(n[0], inverse)), l.keep(good, l.mul(n[1], inverse))]
+    let slant = l.max(slant, l.splat(-2.0));
+    [l.keep(good, slant), l.keep(good, l.mul(n[0], inverse)), l.keep(good, l.mul(n[1], inverse))]
 }
 
 /// Differences of (ray · depth, depth) between the neighbours on two sides, where a neighbour on another surface
@@ -259,8 +259,8 @@ mod tests {
         let mut beyond = 0;
         for i in (5 * 201..16 * 201).filter(|i| (4..197).contains(&(i % 201)) && elements[*i].is_some()) {
             let length = dot(ray(i), ray(i)).sqrt();
-            let facing = elements[i].parts()[1];
-            assert!((facing + length.min(2.0)).abs() < 0.02, "pixel {i}: {facing}, {length}");
+            let slant = elements[i].parts()[1];
+            assert!((slant + length.min(2.0)).abs() < 0.02, "pixel {i}: {slant}, {length}");
             beyond += usize::from(length > 2.05);
         }
         assert!(beyond > 500, "{beyond}");

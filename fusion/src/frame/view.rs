@@ -9,7 +9,7 @@ use super::normals::surface_elements;
 
 /// Surface elements, and colours, of the used part of an image.
 #[derive(Debug, Clone)]
-pub struct View {
+pub struct DepthView {
     /// Ideal pinhole camera of the part.
     pub camera: PinholeCamera,
     /// One element a pixel, row by row, as [`surface_elements`] gives them; those along the border are empty.
@@ -18,7 +18,7 @@ pub struct View {
     pub colors: Vec<[u8; 4]>,
 }
 
-impl View {
+impl DepthView {
     /// The surface elements of a depth image (metres, 0 missing), without colour.
     pub fn new(camera: &PinholeCamera, depth: &[f32], window: usize) -> Self {
         Self { camera: *camera, elements: surface_elements(camera, depth, window), colors: Vec::new() }
@@ -149,7 +149,7 @@ mod tests {
             rig_from_depth: Rigid::identity(),
             fps: 30.0,
         };
-        let mut view = View::new(&depth, &vec![1.5; 80 * 60], 2);
+        let mut view = DepthView::new(&depth, &vec![1.5; 80 * 60], 2);
         view.add_colors(&RgbImage { width: 80, height: 60, pixels: vec![[9, 8, 7]; 80 * 60] }, &sensor);
         for i in (0..80 * 60).filter(|i| view.elements[*i].is_some()) {
             let is_seen = (20..60).contains(&(i % 80)) && (15..45).contains(&(i / 80));

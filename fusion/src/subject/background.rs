@@ -1,4 +1,4 @@
-//! What rests behind the subject: the camera does not move, so that each pixel sees the same in many frames.
+//! The background, which rests behind the subject: the camera does not move, so that each pixel sees the same in many frames.
 
 use crate::frame::is_measured;
 
@@ -18,7 +18,7 @@ pub(crate) struct Resting {
     pub noise: Vec<f32>,
 }
 
-/// What rests behind the subject.
+/// The background, which rests behind the subject.
 pub(crate) struct Background {
     /// The farthest depth of each pixel that a second frame confirms; 0 where there is none.
     pub far: Vec<f32>,

@@ -13,27 +13,27 @@ const ALIGNED: f64 = 0.906;
 /// Distance from a plane within which a pixel belongs to it, metres.
 const BAND: f64 = 0.012;
 /// Smallest share of the upward background pixels that makes a floor.
-const LEAST_SHARE: f64 = 0.15;
+const MIN_SHARE: f64 = 0.15;
 /// A floor is looked for where there are at least this many upward background pixels (on every second row and column).
-const LEAST_PIXELS: usize = 150;
+const MIN_PIXELS: usize = 150;
 /// Smallest spread (standard deviation) of a floor's pixels along its narrower direction, metres.
-const LEAST_SPREAD: f64 = 0.12;
+const MIN_SPREAD: f64 = 0.12;
 /// A disk rises at most this far over the floor, metres.
 const HIGHEST_DISK: f64 = 0.6;
 
 /// The disk is looked for within this distance of where the subject stands, metres.
 const DISK_REACH: f64 = 0.7;
 /// A level has more than this many pixels.
-const LEAST_LEVEL: usize = 40;
+const MIN_LEVEL_PIXELS: usize = 40;
 
-/// Standard deviations of a single frame's height by which a pixel must rise over the level to be none of its own: one of
+/// Standard deviations of a single frame's height by which a pixel must rise over the level not to be one of its own: one of
 /// its own in 30 000 does.
 const NOISE_MARGIN: f64 = 4.0;
 /// The share of a level's pixels whose noise the margin covers: dark patches are noisier than the rest.
 const NOISE_SHARE: f64 = 0.9;
 /// The margin lies within these, metres: the pile of a carpet, and less than the height of a sole that is closed flat.
-const LEAST_MARGIN: f64 = 0.005;
-const MOST_MARGIN: f64 = 0.02;
+const MIN_MARGIN: f64 = 0.005;
+const MAX_MARGIN: f64 = 0.02;
 
 /// The plane the subject stands on, camera frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,13 +69,13 @@ pub(crate) fn find_floor(
     up: &Vector3<f64>,
 ) -> Option<Floor> {
     let pixels = upward_pixels(camera, resting, &up.cast());
-    if pixels.len() < LEAST_PIXELS {
+    if pixels.len() < MIN_PIXELS {
         return None;
     }
     let (normal, point, share) = best_plane(&pixels)?;
     let height = |p: &Point3<f64>| (p - point).dot(&normal);
     let below = subject.iter().filter(|p| height(&p.cast()) < -0.05).count();
-    if share < LEAST_SHARE || below * 10 > subject.len() || spread(&pixels, &normal, &point) < LEAST_SPREAD {
+    if share < MIN_SHARE || below * 10 > subject.len() || spread(&pixels, &normal, &point) < MIN_SPREAD {
         return None;
     }
     Some(disk_on(&pixels, subject, normal, point))
@@ -179,7 +179,7 @@ fn margin(level: &[&LevelPixel], normal: &Vector3<f64>, point: &Point3<f64>) -> 
     let uneven = 1.4826 * quantile(offsets, 0.5).unwrap_or(0.003);
     let noise = level.iter().map(|u| u.height_noise(normal)).collect();
     let noisy = quantile(noise, NOISE_SHARE).unwrap_or(0.0);
-    (NOISE_MARGIN * uneven.hypot(noisy)).clamp(LEAST_MARGIN, MOST_MARGIN)
+    (NOISE_MARGIN * uneven.hypot(noisy)).clamp(MIN_MARGIN, MAX_MARGIN)
 }
 
 /// The value below which a share of the values lies; `None` where there are no values.
@@ -206,7 +206,7 @@ fn highest_level(heights: &[f64]) -> f64 {
         }
     }
     let total: usize = histogram.iter().sum();
-    let filled = |w: &[usize]| w.iter().sum::<usize>() > LEAST_LEVEL.max(total / 12);
+    let filled = |w: &[usize]| w.iter().sum::<usize>() > MIN_LEVEL_PIXELS.max(total / 12);
     let level = histogram.windows(3).rposition(filled);
     level.map_or(0.0, |k| (k as f64 + 1.5) * bin - BAND)
 }

@@ -25,7 +25,7 @@ const MOVING: (f32, f32) = (0.06, 0.03);
 /// Edge of the cells that moving points are clustered in, metres.
 const CELL: f32 = 0.10;
 /// Smallest number of moving pixels a frame that counts as somebody, as a share of the image.
-const LEAST_MOVING: f32 = 0.001;
+const MIN_MOVING: f32 = 0.001;
 /// Room left around what moved, metres.
 const MARGIN: f64 = 0.06;
 
@@ -36,14 +36,14 @@ const MARGIN: f64 = 0.06;
 pub(crate) fn find_volume(camera: &PinholeCamera, depths: &[Vec<f32>]) -> Result<SubjectVolume, FusionError> {
     let background = Background::new(depths);
     let moving = moving_points(camera, depths, &background);
-    let least = (LEAST_MOVING * background.far.len() as f32) as usize * depths.len();
+    let least = (MIN_MOVING * background.far.len() as f32) as usize * depths.len();
     let nobody = |reason: String| FusionError::NobodyInIt { reason };
     if moving.len() * SAMPLE * SAMPLE < least {
         return Err(nobody(format!("only {} of the looked-at pixels ever move", moving.len() * SAMPLE * SAMPLE)));
     }
     let subject = largest_cluster(&moving);
     if subject.len() * SAMPLE * SAMPLE < least {
-        return Err(nobody("what moves is scattered, no single subject".into()));
+        return Err(nobody("the moving parts are scattered, not one subject".into()));
     }
     let (image_up, floor) = find_up(camera, &background.resting, &subject);
     Ok(cylinder(&subject, image_up, floor))

@@ -62,7 +62,7 @@ pub fn fuse(
 ) -> Result<Scan, FusionError> {
     let rig = source.rig().clone();
     let mut clock = Stopwatch::new();
-    let Recording { frames, unreadable, other_sensors } = clock.time("read", || read_all(source, progress))?;
+    let ReadFrames { frames, unreadable, other_sensors } = clock.time("read", || read_all(source, progress))?;
     let volume = match settings.volume {
         Volume::All => None,
         Volume::Auto => Some(clock.time("survey", || survey(&rig, &spread(&frames), settings))?),
@@ -88,8 +88,8 @@ fn spread(frames: &[Waiting]) -> Vec<Frame> {
     with_depth.into_iter().step_by(step).map(Waiting::unpacked).collect()
 }
 
-/// What a source holds.
-struct Recording {
+/// The content of a source.
+struct ReadFrames {
     /// The frames of the first sensor.
     frames: Vec<Waiting>,
     /// Frames that could not be read.
@@ -99,7 +99,7 @@ struct Recording {
 }
 
 /// Reads all frames.
-fn read_all(source: &mut dyn Source, progress: &(dyn Fn(f32) + Sync)) -> Result<Recording, FusionError> {
+fn read_all(source: &mut dyn Source, progress: &(dyn Fn(f32) + Sync)) -> Result<ReadFrames, FusionError> {
     let total = source.frame_count();
     let (mut frames, mut unreadable): (Vec<Waiting>, _) = (Vec::new(), Vec::new());
     let mut others = BTreeSet::new();
@@ -133,7 +133,7 @@ fn read_all(source: &mut dyn Source, progress: &(dyn Fn(f32) + Sync)) -> Result<
         return Err(FusionError::NoDepth { frames: frames.len() });
     }
     let name = |k: usize| source.rig().sensors.get(k).map_or_else(|| format!("number {k}"), |s| s.name.clone());
-    Ok(Recording { frames, unreadable, other_sensors: others.into_iter().map(name).collect() })
+    Ok(ReadFrames { frames, unreadable, other_sensors: others.into_iter().map(name).collect() })
 }
 
 /// Finds the subject's volume in frames spread over the take.

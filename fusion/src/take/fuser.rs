@@ -5,20 +5,20 @@ use toile_geometry::{Mesh, Rigid};
 
 use super::{
     model::Model,
-    preparer::{LEAST_PIXELS, Preparer, first_sensor},
+    preparer::{MIN_PIXELS, Preparer, first_sensor},
 };
 use crate::{
     FusionError, FusionSettings,
     drop_reason::DropReason,
     field::extract_surface,
-    frame::{CutDepth, View},
+    frame::{CutDepth, DepthView},
     report::DroppedFrame,
     subject::SubjectVolume,
     timings::Stopwatch,
     tracking::{Kept, KeptFrame, Past, Tracked, Tracker},
 };
 
-/// What became of a pushed frame.
+/// The outcome of a pushed frame.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// It is in the model.
@@ -35,7 +35,7 @@ pub enum Outcome {
     },
 }
 
-/// What happened to the frames that are not in the model.
+/// The outcomes of the frames that are not in the model.
 #[derive(Debug, Default)]
 pub(crate) struct Log {
     /// Frames that were pushed or could not be read.
@@ -114,7 +114,7 @@ impl Fuser {
     }
 
     /// The subject's depth in a frame and its surface elements.
-    fn prepare(&mut self, frame: &Frame) -> Result<(CutDepth, View), DropReason> {
+    fn prepare(&mut self, frame: &Frame) -> Result<(CutDepth, DepthView), DropReason> {
         let depth = self.preparer.prepare(frame, &mut self.clock)?;
         let is_first = self.kept.is_empty();
         if is_first {
@@ -122,7 +122,7 @@ impl Fuser {
         }
         let window = self.model.window;
         let view = self.clock.time("normals", || depth.view(window));
-        if is_first && view.count() < LEAST_PIXELS {
+        if is_first && view.count() < MIN_PIXELS {
             return Err(DropReason::TooLittleSurface);
         }
         Ok((depth, view))

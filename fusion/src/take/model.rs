@@ -5,7 +5,7 @@ use toile_geometry::Rigid;
 use crate::{
     FusionError,
     field::{Touched, Tsdf, integrate},
-    frame::{CutDepth, View, depth_noise, is_measured, window_for},
+    frame::{CutDepth, DepthView, depth_noise, is_measured, window_for},
     settings::FusionSettings,
     timings::Stopwatch,
 };
@@ -64,7 +64,7 @@ impl Model {
     /// [`FusionError::TooLarge`] where the field outgrows its index.
     pub(crate) fn integrate(
         &mut self,
-        view: &View,
+        view: &DepthView,
         model_from_camera: &Rigid,
         clock: &mut Stopwatch,
     ) -> Result<(), FusionError> {

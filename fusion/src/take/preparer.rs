@@ -12,9 +12,9 @@ use crate::{
 };
 
 /// A depth image has at most this many pixels: their numbers, with the border that a view adds, must be exact as floats.
-const MOST_PIXELS: u64 = 16_000_000;
+const MAX_PIXELS: u64 = 16_000_000;
 /// A frame that is used has at least this many measured pixels.
-pub(crate) const LEAST_PIXELS: usize = 500;
+pub(crate) const MIN_PIXELS: usize = 500;
 
 /// Filters the depth of one sensor and cuts the subject out.
 pub(crate) struct Preparer {
@@ -59,7 +59,7 @@ impl Preparer {
             None => CutDepth::new(camera, &depth, self.depth_scale),
         });
         let pixels = cut.count();
-        if pixels < LEAST_PIXELS {
+        if pixels < MIN_PIXELS {
             return Err(DropReason::TooFewPixels { pixels });
         }
         Ok(cut)
@@ -76,7 +76,7 @@ pub(crate) fn first_sensor(rig: &Rig) -> Result<&Sensor, FusionError> {
     if !sensor.depth.is_valid() || sensor.depth_scale.is_nan() || sensor.depth_scale <= 0.0 {
         return Err(wrong("image size, focal length or depth scale is not positive"));
     }
-    if u64::from(sensor.depth.width) * u64::from(sensor.depth.height) > MOST_PIXELS {
+    if u64::from(sensor.depth.width) * u64::from(sensor.depth.height) > MAX_PIXELS {
         return Err(wrong("its depth image has more than 16 million pixels; record at a smaller size"));
     }
     Ok(sensor)

@@ -6,13 +6,13 @@ use toile_geometry::Rigid;
 
 use super::{
     equations::{Residual, accumulate},
-    registration::{LEAST_POINTS, register, tukey},
+    registration::{MIN_POINTS, register, tukey},
     samples::{Sample, centroid, every, samples},
     tracked::Tracked,
 };
 use crate::{
     field::{Hit, ModelView, Tsdf, ray_cast},
-    frame::{View, dot},
+    frame::{DepthView, dot},
 };
 
 /// About how many points the registration uses.
@@ -28,11 +28,11 @@ const GATES: [f64; 7] = [0.10, 0.08, 0.06, 0.05, 0.04, 0.03, 0.03];
 const STRIDES: [usize; 2] = [3, 4];
 const LARGE_IMAGE: usize = 60_000;
 /// Smallest cosine between a point's normal and that of the hit it belongs to.
-const SAME_FACING: f32 = 0.6;
+const MIN_COSINE: f32 = 0.6;
 
 /// Registers a view to the model from a predicted pose: against the distance field at once where that pose lies well
 /// within its band, else after an approach.
-pub fn track(field: &Tsdf, view: &View, predicted: &Rigid) -> Tracked {
+pub fn track(field: &Tsdf, view: &DepthView, predicted: &Rigid) -> Tracked {
     let points = samples(view, FINE_POINTS);
     let near = register(field, &points, predicted);
     if near.converged && near.overlap > NEAR_OVERLAP && near.inliers > NEAR_INLIERS {
@@ -55,7 +55,7 @@ pub fn approach(model: &ModelView, rendered_at: &Rigid, points: &[Sample], start
             let r = f64::from(dot(hit.normal, [q.x - hit.point[0], q.y - hit.point[1], q.z - hit.point[2]]));
             Some(Residual { value: r, gradient: hit.normal, kernel: tukey(r, gate) })
         });
-        if system.count < LEAST_POINTS {
+        if system.count < MIN_POINTS {
             break;
         }
         pose = system.step(&center, 1e-4).motion * pose;
@@ -80,5 +80,5 @@ fn associate(
     }
     let hit = model.hits[v as usize * model.width + u as usize]?;
     let d = [q.x - hit.point[0], q.y - hit.point[1], q.z - hit.point[2]];
-    (f64::from(dot(d, d)) < gate * gate && dot(hit.normal, normal) > SAME_FACING).then_some(hit)
+    (f64::from(dot(d, d)) < gate * gate && dot(hit.normal, normal) > MIN_COSINE).then_some(hit)
 }

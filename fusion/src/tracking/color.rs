@@ -6,7 +6,10 @@
 //! cameras", with earlier frames in place of one key frame).
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use toile_geometry::Rigid;
+use toile_geometry::{
+    Rigid,
+    statistics::{median, sigma_about_zero},
+};
 
 use super::{
     equations::{NormalEquations, Residual, accumulate},
@@ -23,12 +26,12 @@ const STEPS: usize = 8;
 /// A step below this (metres at the subject's radius) has converged.
 const CONVERGED: f64 = 2e-5;
 /// Smallest robust spread of grey values, and of distances (metres): below, quantisation speaks.
-const LEAST_GREY_SPREAD: f64 = 2.0;
-const LEAST_SPREAD: f64 = 5e-4;
+const MIN_GREY_SPREAD: f64 = 2.0;
+const MIN_SPREAD: f64 = 5e-4;
 /// Smallest cosine between a point's normal and the ray on which an earlier frame sees it.
-const FACING: f32 = 0.4;
+const MIN_COSINE: f32 = 0.4;
 /// Fewer points than this say nothing.
-const LEAST_POINTS: usize = 100;
+const MIN_POINTS: usize = 100;
 
 /// A frame whose pose is known.
 pub(crate) struct EarlierFrame<'a> {
@@ -87,7 +90,7 @@ fn joint_system(
     pose: &Rigid,
     center: &Point3<f64>,
 ) -> Option<JointSystem> {
-    let distance = robust_spread(field, points, pose)?.max(LEAST_SPREAD);
+    let distance = robust_spread(field, points, pose)?.max(MIN_SPREAD);
     let gate = (4.7 * distance).min(0.9 * f64::from(field.truncation()));
     let mut equations = accumulate(points, pose, center, |_, q, n| {
         let surface = surface_distance(field, q, n)?;
@@ -115,12 +118,12 @@ fn color_system(
     share: f64,
 ) -> Option<JointSystem> {
     let mut all: Vec<f64> = points.iter().filter_map(|s| comparison.difference(s, pose)).map(|d| d.value).collect();
-    if all.len() < LEAST_POINTS {
+    if all.len() < MIN_POINTS {
         return None;
     }
-    let offset = median(&mut all);
+    let offset = median(&mut all).unwrap_or(0.0);
     let mut sizes: Vec<f64> = all.iter().map(|d| (d - offset).abs()).collect();
-    let spread = (1.4826 * median(&mut sizes)).max(LEAST_GREY_SPREAD);
+    let spread = sigma_about_zero(&mut sizes).unwrap_or(0.0).max(MIN_GREY_SPREAD);
     let gate = 4.7 * spread;
     let equations = accumulate(points, pose, center, |s, _, _| {
         let difference = comparison.difference(s, pose)?;
@@ -157,7 +160,7 @@ impl<'a> Comparison<'a> {
         let earlier_from_camera = self.camera_from_model * pose;
         let p = (earlier_from_camera * s.point.cast::<f64>()).cast::<f32>();
         let normal = earlier_from_camera.rotation.cast::<f32>() * Vector3::from(s.normal);
-        if p.z < 0.1 || -dot(normal.into(), p.coords.into()) < FACING * p.coords.norm() {
+        if p.z < 0.1 || -dot(normal.into(), p.coords.into()) < MIN_COSINE * p.coords.norm() {
             return None;
         }
         let here = self.picture.look_up(self.level, &s.point)?;
@@ -165,13 +168,4 @@ impl<'a> Comparison<'a> {
         let gradient = (self.turn * there.gradient).into();
         Some(Difference { value: f64::from(there.value - here.value), gradient })
     }
-}
-
-/// The middle value; 0 where there is none.
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -45,7 +45,7 @@ impl Picture {
         Self { camera, color_from_depth: sensor.color_from_depth, levels }
     }
 
-    /// What a point (depth camera's frame) looks like on a level; `None` outside the picture.
+    /// The grey value of a point (depth camera's frame) on a level; `None` outside the picture.
     pub(crate) fn look_up(&self, level: usize, p: &Point3<f32>) -> Option<GreyAt> {
         let q = self.color_from_depth * p.cast::<f64>();
         let grey = &self.levels[level];

@@ -1,7 +1,7 @@
 //! The frames of the model, kept to be compared with and to be fused again.
 
 use toile_capture::{ColorImage, Frame};
-use toile_geometry::Rigid;
+use toile_geometry::{Rigid, statistics::median};
 
 use super::tracked::{Located, Tracked};
 use crate::{field::Tsdf, frame::CutDepth};
@@ -29,7 +29,7 @@ pub(crate) struct Kept {
     pub frames: Vec<KeptFrame>,
 }
 
-/// What a new frame is compared with: the model's field and the frames in it.
+/// The reference of a new frame: the model's field and the frames in it.
 #[derive(Clone, Copy)]
 pub(crate) struct Past<'a> {
     pub field: &'a Tsdf,
@@ -98,8 +98,7 @@ impl Kept {
     pub(crate) fn usual_residual(&self) -> f64 {
         let last = self.frames.iter().rev().take(USUAL);
         let mut residuals: Vec<f64> = last.filter_map(|k| k.tracked.map(|t| t.residual)).collect();
-        residuals.sort_unstable_by(f64::total_cmp);
-        residuals.get(residuals.len() / 2).copied().unwrap_or(f64::INFINITY)
+        median(&mut residuals).unwrap_or(f64::INFINITY)
     }
 
     /// At most this many frames, evenly spaced from the first on.

@@ -1,8 +1,8 @@
-//! What the motion so far says about the next pose: a turntable's axis and rate, estimated while frames come, or
+//! The next pose by the motion so far: a turntable's axis and rate, estimated while frames come, or
 //! constant velocity.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion};
-use toile_geometry::Rigid;
+use toile_geometry::{Rigid, statistics::median};
 
 use super::axis::{Axis, find_axis};
 use crate::settings::Prior;
@@ -80,8 +80,7 @@ impl MotionModel {
             axis.angle(&motion) / seconds(w[1].time_ns - w[0].time_ns).max(1e-6)
         };
         let mut rates: Vec<f64> = self.poses.windows(2).rev().take(RATE_STEPS).map(rate).collect();
-        rates.sort_unstable_by(f64::total_cmp);
-        rates.get(rates.len() / 2).copied().unwrap_or(0.0)
+        median(&mut rates).unwrap_or(0.0)
     }
 }
 

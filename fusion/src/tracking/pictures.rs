@@ -12,7 +12,7 @@ use super::{
     samples::samples,
     tracked::Tracked,
 };
-use crate::frame::{View, decode_color};
+use crate::frame::{DepthView, decode_color};
 
 /// Points that are compared by colour.
 const POINTS: usize = 2500;
@@ -76,7 +76,7 @@ impl Pictures {
 
 impl Compared<'_> {
     /// The pose at which shape and colours agree best, of several starts; `None` where nothing can be compared.
-    pub(crate) fn track(&self, view: &View, starts: &[Rigid]) -> Option<Tracked> {
+    pub(crate) fn track(&self, view: &DepthView, starts: &[Rigid]) -> Option<Tracked> {
         let points = samples(view, POINTS);
         let earlier: Vec<EarlierFrame> =
             self.earlier.iter().map(|(pose, picture)| EarlierFrame { picture, model_from_camera: *pose }).collect();

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-use toile_geometry::Rigid;
+use toile_geometry::{Rigid, statistics::sigma_about_zero};
 
 use super::{
     equations::{CHUNK, Residual, accumulate},
@@ -23,7 +23,7 @@ const ITERATIONS: usize = 15;
 /// Iterations in which the gate follows the data; then it stays, so that steps converge.
 const GATED: usize = 3;
 /// Fewer points than this say nothing.
-pub(crate) const LEAST_POINTS: usize = 50;
+pub(crate) const MIN_POINTS: usize = 50;
 /// Robust standard deviations at which Tukey's kernel ends.
 const TUKEY: f64 = 4.7;
 /// The smallest gate, metres.
@@ -59,7 +59,7 @@ pub fn register(field: &Tsdf, points: &[Sample], start: &Rigid) -> Tracked {
                 Some(Residual { value: surface.distance, gradient: surface.normal, kernel })
             });
             iterations += 1;
-            if system.count < LEAST_POINTS {
+            if system.count < MIN_POINTS {
                 break;
             }
             let step = system.step(&center, 1e-6);
@@ -104,12 +104,10 @@ pub(crate) fn surface_distance(field: &Tsdf, q: &Point3<f32>, normal: [f32; 3]) 
 pub(crate) fn robust_spread(field: &Tsdf, points: &[Sample], pose: &Rigid) -> Option<f64> {
     let few = every(points.len() / 1000 + 1, points);
     let mut all: Vec<f64> = distances(field, &few, pose).into_iter().flatten().map(f64::abs).collect();
-    if all.len() < LEAST_POINTS {
+    if all.len() < MIN_POINTS {
         return None;
     }
-    let middle = all.len() / 2;
-    let (_, median, _) = all.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(1.4826 * *median)
+    sigma_about_zero(&mut all)
 }
 
 /// Signed distance of every sample; `None` outside the band.
@@ -131,8 +129,7 @@ pub(crate) fn assess(field: &Tsdf, points: &[Sample], found: Tracked) -> Tracked
     let all = distances(field, points, &found.model_from_camera);
     let within: Vec<f64> = all.iter().flatten().copied().collect();
     let mut sizes: Vec<f64> = within.iter().map(|d| d.abs()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    let spread = 1.4826 * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+    let spread = sigma_about_zero(&mut sizes).unwrap_or(0.0);
     let limit = (3.0 * spread).max(5e-4);
     let inliers: Vec<f64> = within.iter().copied().filter(|d| d.abs() <= limit).collect();
     let mean_square = inliers.iter().map(|d| d * d).sum::<f64>() / inliers.len().max(1) as f64;

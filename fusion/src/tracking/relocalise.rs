@@ -13,7 +13,7 @@ use super::{
     starts::{FIRST_TURNS, best_of, turned},
     tracked::Tracked,
 };
-use crate::{field::Tsdf, frame::View, settings::Prior};
+use crate::{field::Tsdf, frame::DepthView, settings::Prior};
 
 /// Lost frames in a row before the subject is searched for.
 pub(crate) const PATIENCE: usize = 1;
@@ -27,7 +27,7 @@ pub(crate) const SLICES: usize = 4;
 const PLACES: usize = 12;
 
 /// The best fit at key poses and, on a turntable, at turned predictions.
-pub(crate) fn try_known_places(past: Past<'_>, view: &View, predicted: &Rigid, prior: Prior) -> Tracked {
+pub(crate) fn try_known_places(past: Past<'_>, view: &DepthView, predicted: &Rigid, prior: Prior) -> Tracked {
     let frames = &past.kept.frames;
     let step = (frames.len() / PLACES).max(1);
     let mut starts: Vec<Rigid> = frames.iter().rev().step_by(step).map(|k| k.model_from_camera).collect();
@@ -38,7 +38,7 @@ pub(crate) fn try_known_places(past: Past<'_>, view: &View, predicted: &Rigid, p
 }
 
 /// The best fit at the next turns about the axis, when `lost` frames in a row have had no trusted pose.
-pub(crate) fn search_about(axis: &Axis, field: &Tsdf, view: &View, predicted: &Rigid, lost: usize) -> Tracked {
+pub(crate) fn search_about(axis: &Axis, field: &Tsdf, view: &DepthView, predicted: &Rigid, lost: usize) -> Tracked {
     let slice = (lost - PATIENCE - 1) % SLICES;
     let turn = |k: usize| {
         let size = k.div_ceil(2) as f64 * SEARCH_STEP.to_radians();

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use toile_geometry::Rigid;
 
-use crate::frame::{View, dot};
+use crate::frame::{DepthView, dot};
 
 /// A weighted point of a frame, camera frame.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,7 @@ pub struct Sample {
 }
 
 /// Samples of a view, thinned to about `count`.
-pub fn samples(view: &View, count: usize) -> Vec<Sample> {
+pub fn samples(view: &DepthView, count: usize) -> Vec<Sample> {
     let all = view.count();
     let stride = ((all as f64 / count.max(1) as f64).sqrt().round() as usize).max(1);
     view.samples(stride)

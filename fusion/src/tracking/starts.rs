@@ -7,7 +7,7 @@ use toile_geometry::Rigid;
 use super::{approach::approach, registration::register, samples::samples, tracked::Tracked};
 use crate::{
     field::{Tsdf, ray_cast},
-    frame::View,
+    frame::DepthView,
 };
 
 /// First guesses of the turn between two frames, degrees.
@@ -19,7 +19,7 @@ const POINTS: usize = 6000;
 const TRIAL_STRIDE: usize = 6;
 
 /// The pose that fits best among registrations from several starts.
-pub(crate) fn best_of(field: &Tsdf, view: &View, starts: &[Rigid]) -> Tracked {
+pub(crate) fn best_of(field: &Tsdf, view: &DepthView, starts: &[Rigid]) -> Tracked {
     let few = samples(view, TRIAL_POINTS);
     let score = |t: &Tracked| t.overlap * t.inliers / (t.residual + 1e-3);
     let rough: Vec<Tracked> = starts

@@ -1,9 +1,9 @@
-//! What the registration of a frame found.
+//! The result of registering a frame.
 
 use serde::Serialize;
 use toile_geometry::Rigid;
 
-/// What tracking found out about a frame.
+/// The result of tracking a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Tracked {
     /// The pose that was found.

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     drop_reason::DropReason,
-    frame::View,
+    frame::DepthView,
     settings::{FusionSettings, KNOWN_POSE_WITHIN_NS, KnownPose, Prior},
     timings::Stopwatch,
 };
@@ -27,7 +27,7 @@ const CANDIDATE: f64 = 1.5;
 /// A prediction is only believed when the model holds more frames than this.
 const SETTLED: usize = 4;
 
-/// What is known since the subject was last where it was expected.
+/// The state since the subject was last where it was expected.
 #[derive(Debug, Clone, Default)]
 struct Lost {
     /// Frames in a row without a trusted pose.
@@ -77,7 +77,7 @@ impl Tracker {
     pub(crate) fn locate(
         &mut self,
         frame: &Frame,
-        view: &View,
+        view: &DepthView,
         past: Past<'_>,
         clock: &mut Stopwatch,
     ) -> Result<Located, DropReason> {
@@ -115,7 +115,7 @@ impl Tracker {
         &mut self,
         by_shape: Tracked,
         frame: &Frame,
-        view: &View,
+        view: &DepthView,
         past: Past<'_>,
         starts: &[Rigid],
         clock: &mut Stopwatch,
@@ -133,7 +133,7 @@ impl Tracker {
         &mut self,
         reason: DropReason,
         frame: &Frame,
-        view: &View,
+        view: &DepthView,
         past: Past<'_>,
         predicted: &Rigid,
         clock: &mut Stopwatch,
@@ -160,7 +160,7 @@ impl Tracker {
         &self,
         axis: &Axis,
         time_ns: i64,
-        view: &View,
+        view: &DepthView,
         past: Past<'_>,
         clock: &mut Stopwatch,
     ) -> Option<TimedPose> {

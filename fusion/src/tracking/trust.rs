@@ -6,7 +6,7 @@ use toile_geometry::Rigid;
 use super::tracked::Tracked;
 use crate::{
     drop_reason::DropReason,
-    frame::{View, depth_noise},
+    frame::{DepthView, depth_noise},
 };
 
 /// Smallest overlap and share of inliers of a trusted pose.
@@ -25,7 +25,7 @@ const DEPARTURE_ANGLE: f64 = 0.12;
 /// # Errors
 /// Why the pose cannot be trusted.
 pub(crate) fn trusted(
-    view: &View,
+    view: &DepthView,
     tracked: &Tracked,
     truncation: f32,
     expected: Option<&Rigid>,
@@ -46,7 +46,7 @@ pub(crate) fn trusted(
 }
 
 /// The largest residual that is trusted, metres; the frame's noise is only measured where that decides.
-fn residual_limit(view: &View, residual: f64, truncation: f32) -> f64 {
+fn residual_limit(view: &DepthView, residual: f64, truncation: f32) -> f64 {
     let limit = RESIDUAL * f64::from(truncation);
     if residual <= limit {
         return limit;

@@ -1,15 +1,15 @@
-//! What edits did to a scan's labels.
+//! The effect of edits on a scan's labels.
 
 use serde::Serialize;
 
 use super::format::{EditName, Mark};
 
-/// What edits did to a scan's labels, as the garment's mesh needs it.
+/// The effect of edits on a scan's labels, as the garment's mesh needs it.
 #[derive(Debug, Clone)]
 pub struct Applied {
     /// True for vertices whose labels an edit may have changed.
     pub near: Vec<bool>,
-    /// What the last stroke that touches a vertex says.
+    /// The statement of the last stroke that touches a vertex.
     pub painted: Vec<Option<Mark>>,
     /// Signed distance from a hem line, metres, positive on the garment's side; `None` away from hem lines.
     pub hem_distance: Vec<Option<f32>>,

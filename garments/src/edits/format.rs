@@ -17,8 +17,8 @@ const LARGEST_COORDINATE: f32 = 100.0;
 /// A hem line has at least this length, metres.
 const SHORTEST_LINE: f32 = 0.002;
 /// Limit of the points of all edits of a layer.
-const MOST_POINTS: usize = 100_000;
-/// Limit of a file's size, bytes: [`MOST_POINTS`] in full precision take a twentieth of it.
+const MAX_POINTS: usize = 100_000;
+/// Limit of a file's size, bytes: [`MAX_POINTS`] in full precision take a twentieth of it.
 const LARGEST_FILE: usize = 100_000_000;
 
 /// All edits of a layer, as in `edits/01-trousers.json`.
@@ -37,13 +37,13 @@ pub struct Edits {
     pub hems: Vec<HemLine>,
 }
 
-/// What a stroke says.
+/// The statement of a stroke.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mark {
-    /// What is touched belongs to the garment.
+    /// The touched cloth belongs to the garment.
     Belongs,
-    /// What is touched does not belong to it.
+    /// The touched surface does not belong to it.
     DoesNotBelong,
 }
 
@@ -61,7 +61,7 @@ impl Mark {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stroke {
-    /// What it says.
+    /// Its statement.
     pub mark: Mark,
     /// Its path: one point or more on the scan's surface, in the scan's frame, metres.
     pub points: Vec<[f32; 3]>,
@@ -137,8 +137,8 @@ impl Edits {
             return wrong(format!("version {} is not known; this program reads version {VERSION}", self.version));
         }
         let count: usize = self.parts().map(|p| p.points.len()).sum();
-        if count > MOST_POINTS {
-            return wrong(format!("{count} points are too many; thin the strokes to at most {MOST_POINTS}"));
+        if count > MAX_POINTS {
+            return wrong(format!("{count} points are too many; thin the strokes to at most {MAX_POINTS}"));
         }
         self.parts().find_map(|part| part.fault()).map_or(Ok(()), wrong)
     }

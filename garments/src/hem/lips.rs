@@ -7,11 +7,11 @@ use super::border::Border;
 /// Lips are looked for within this share of the greatest depth of a step; the cloth is read beyond it.
 const LIP_WIDTH: f32 = 0.7;
 /// A lip's normal is further than this (cosine) from the cloth's.
-const LIP_FACING: f32 = 0.7;
+const LIP_ALIGNMENT: f32 = 0.7;
 /// A lip lies at least this far below the cloth's plane, metres.
 const LIP_DROP: f32 = 0.002;
 /// Cloth behind a hem must have this area to be believed, square metres.
-const LEAST_BEHIND: f32 = 5e-5;
+const MIN_BEHIND: f32 = 5e-5;
 /// Cloth behind a hem is flat enough where the sum of its normals has this share of its area.
 const FLAT: f32 = 0.7;
 
@@ -19,7 +19,7 @@ const FLAT: f32 = 0.7;
 pub(super) fn lip_vertices(border: &Border) -> Vec<u32> {
     let graph = &border.on.graph;
     let is_turned = |cloth: Plane, v: usize| {
-        graph.normals[v].dot(&cloth.normal) < LIP_FACING
+        graph.normals[v].dot(&cloth.normal) < LIP_ALIGNMENT
             && (graph.positions[v] - cloth.center).dot(&cloth.normal) < -LIP_DROP
     };
     let is_lip = |&v: &u32| {
@@ -47,6 +47,6 @@ fn cloth_behind(border: &Border, center: u32) -> Option<Plane> {
             normal += graph.normals[v] * graph.areas[v];
         }
     }
-    let believed = normal.norm() > FLAT * area && area > LEAST_BEHIND;
+    let believed = normal.norm() > FLAT * area && area > MIN_BEHIND;
     believed.then(|| Plane { center: Point3::from(sum / area), normal: normal.normalize() })
 }

@@ -3,7 +3,7 @@
 use super::border::Border;
 
 /// A vertex whose normal is further than this (cosine) from the earlier surface's lies on a step.
-const STEP_FACING: f32 = 0.75;
+const STEP_ALIGNMENT: f32 = 0.75;
 
 /// From the border inward, every vertex that faces away from the earlier surface and is not `colored` as the garment is.
 pub(super) fn step_vertices(border: &Border, colored: impl Fn(usize) -> bool) -> Vec<u32> {
@@ -11,7 +11,7 @@ pub(super) fn step_vertices(border: &Border, colored: impl Fn(usize) -> bool) ->
     let steep = |v: u32| {
         let v = v as usize;
         let near = border.garment[v] && border.distance[v].is_finite();
-        near && on.evidence.facing[v] <= STEP_FACING && !colored(v)
+        near && on.evidence.alignment[v] <= STEP_ALIGNMENT && !colored(v)
     };
     let starts = (0..on.graph.len() as u32).filter(|&v| border.distance[v as usize] == 0.0 && steep(v));
     let mut stack: Vec<u32> = starts.collect();

@@ -25,8 +25,8 @@ pub(crate) fn settle_closed_patches(mut labels: Labels, on: &Measured) -> Labels
     let patches = patches(on, &labels, &closed, &patch_of, areas.len());
     for v in closed {
         let patch = &patches[patch_of[v] as usize];
-        let along = evidence.facing[v] > ALONG && evidence.height[v].abs() < NEAR;
-        let along_body = evidence.body_facing[v] > ALONG && evidence.body_distance[v] < 2.0 * NEAR;
+        let along = evidence.alignment[v] > ALONG && evidence.height[v].abs() < NEAR;
+        let along_body = evidence.body_alignment[v] > ALONG && evidence.body_distance[v] < 2.0 * NEAR;
         let is_garment = if patch.bone_passes {
             labels.garment[v] && along && along_body
         } else {

@@ -13,7 +13,7 @@ use crate::{
 /// Capacities are integers: one unit is this many square metres times nats.
 const UNIT: f32 = 1e-9;
 /// A hem along the strongest edge still costs this share.
-const LEAST_EDGE: f32 = 0.12;
+const MIN_EDGE: f32 = 0.12;
 /// Rounds of averaging log odds over the neighbourhood for the confidence of labels.
 const CONFIDENCE_ROUNDS: usize = 3;
 
@@ -62,7 +62,7 @@ fn edge_costs(graph: &ScanGraph, evidence: &Evidence, smoothness: f32) -> Vec<f3
     let height_scale = 1.0 / (4.0 * mean(1).max(evidence.height_noise.powi(2)));
     let cost = |(&[color, height], dual): (&[f32; 2], &f32)| {
         let edge = (-(color * color_scale + height * height_scale)).exp();
-        smoothness * dual * (LEAST_EDGE + (1.0 - LEAST_EDGE) * edge)
+        smoothness * dual * (MIN_EDGE + (1.0 - MIN_EDGE) * edge)
     };
     jumps.iter().zip(&graph.dual_lengths).map(cost).collect()
 }

@@ -10,7 +10,7 @@ use crate::{
         Measured,
         body_parts::{BodyPart, PART_COUNT, part_of},
     },
-    take::Take,
+    take::DressedTake,
 };
 
 /// Cloth this near to the inner thigh follows it, metres.
@@ -79,7 +79,7 @@ fn covered_shares(on: &Measured, new: impl Fn(usize) -> bool) -> [f32; PART_COUN
 }
 
 /// Share of the inner thighs that new cloth follows: trousers do, a skirt hangs around both legs.
-fn inner_thighs(take: &Take, labels: &Labels) -> f32 {
+fn inner_thighs(take: &DressedTake, labels: &Labels) -> f32 {
     let joints = take.pose.joint_positions(take.skeleton);
     let across = joints[Joint::RightUpperLeg.index()] - joints[Joint::LeftUpperLeg.index()];
     let across = across.cast::<f32>().try_normalize(1e-6).unwrap_or(-Vector3::x());
@@ -105,7 +105,7 @@ fn inner_thighs(take: &Take, labels: &Labels) -> f32 {
 }
 
 /// True where the middle of the back is covered much more than the middle of the front.
-fn front_is_open(take: &Take, labels: &Labels) -> bool {
+fn front_is_open(take: &DressedTake, labels: &Labels) -> bool {
     let scan_from_chest = take.pose.joint_frames(take.skeleton)[Joint::Chest.index()].cast::<f32>();
     let body = Bvh::new(&take.body.positions, &take.body.triangles);
     let normals = take.body.triangle_normals();

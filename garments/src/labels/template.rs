@@ -1,4 +1,4 @@
-//! What is known of each type of garment: where on the body it can be (Hu et al. 2017, §6.2 and Fig. 6), and its cloth.
+//! Facts about each type of garment: where on the body it can be (Hu et al. 2017, §6.2 and Fig. 6), and its cloth.
 
 use toile_character::GarmentType;
 

@@ -33,8 +33,8 @@ pub(super) struct Compared {
     /// Colour difference there; NaN where either side has no colour.
     pub color: f32,
     /// Cosine between the normals.
-    pub facing: f32,
-    /// Distance from the closest surface of any facing, metres; infinite where none is within reach.
+    pub alignment: f32,
+    /// Distance from the closest surface whichever way it faces, metres; infinite where none is within reach.
     pub clearance: f32,
 }
 
@@ -62,16 +62,16 @@ impl<'a> Before<'a> {
         let same_way = |t: u32| self.normals[t as usize].dot(normal) > SAME_WAY;
         let hit = self.bvh.closest_where(p, settings.reach, same_way);
         let Some(hit) = hit.or_else(|| self.bvh.closest(p, settings.reach)) else {
-            return Compared { height: f32::INFINITY, color: f32::NAN, facing: 1.0, clearance: f32::INFINITY };
+            return Compared { height: f32::INFINITY, color: f32::NAN, alignment: 1.0, clearance: f32::INFINITY };
         };
         let sign = if (p - hit.point).dot(&self.normals[hit.triangle as usize]) >= 0.0 { 1.0 } else { -1.0 };
         let corner = self.mesh.triangles[hit.triangle as usize][largest(hit.barycentric)];
         let color = match lab {
-            Some(lab) if !self.lab.is_empty() => self.least_difference(corner, lab, settings.color_search),
+            Some(lab) if !self.lab.is_empty() => self.minimum_difference(corner, lab, settings.color_search),
             _ => f32::NAN,
         };
         let clearance = self.bvh.closest(p, hit.distance).map_or(hit.distance, |any| any.distance);
-        Compared { height: sign * hit.distance, color, facing: self.smooth_normal(&hit).dot(normal), clearance }
+        Compared { height: sign * hit.distance, color, alignment: self.smooth_normal(&hit).dot(normal), clearance }
     }
 
     fn smooth_normal(&self, hit: &Closest) -> Vector3<f32> {
@@ -81,7 +81,7 @@ impl<'a> Before<'a> {
     }
 
     /// Smallest colour difference from the surface within `radius` metres of vertex `center`.
-    fn least_difference(&self, center: u32, lab: &[f32; 3], radius: f32) -> f32 {
+    fn minimum_difference(&self, center: u32, lab: &[f32; 3], radius: f32) -> f32 {
         let seen = |v: u32| self.filled.is_none_or(|f| f[v as usize] < 0.5);
         let origin = self.mesh.positions[center as usize];
         let mut visited = vec![center];

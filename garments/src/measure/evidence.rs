@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::{before::Before, body_parts::PART_COUNT, noise::noise, on_body::on_body, scan_graph::ScanGraph};
-use crate::{settings::ExtractSettings, take::Take};
+use crate::{settings::ExtractSettings, take::DressedTake};
 
 /// Cloth worn before lies differently in each take, by this share of its distance from the body.
 const SLIP_SHARE: f32 = 0.2;
@@ -11,7 +11,7 @@ const SLIP_SHARE: f32 = 0.2;
 const SLIPS: f32 = 0.03;
 /// Scale of the exponential heights of new cloth over the surface below, metres: near hems it is low, skirts reach far.
 const CLOTH_HEIGHT: f32 = 0.06;
-/// What the density of cloth heights is divided by, metres: most cloth lies within this.
+/// Divisor of the density of cloth heights, metres: most cloth lies within this.
 const CLOTH_SPREAD: f32 = 0.017;
 /// How far new cloth presses in the surface below, metres.
 const CLOTH_PRESS: f32 = 0.002;
@@ -22,7 +22,7 @@ const OUT_OF_REACH: f32 = 3.0;
 /// Neither height nor colour decides by more than this, nats.
 const LIMIT: f32 = 4.0;
 
-/// What was measured at each scan vertex.
+/// The measurements at each scan vertex.
 #[derive(Debug, Clone)]
 pub struct Evidence {
     /// Signed height over the earlier surface, metres; infinite where none is within reach.
@@ -32,13 +32,13 @@ pub struct Evidence {
     /// Colour difference from the nearest place of the earlier surface; NaN where either was not seen.
     pub color: Vec<f32>,
     /// Cosine between the scan's normal and the earlier surface's: small where a hem's edge drops to the surface below.
-    pub facing: Vec<f32>,
+    pub alignment: Vec<f32>,
     /// Shares of the body parts at the closest point of the body.
     pub parts: Vec<[f32; PART_COUNT]>,
     /// Distance from the body, metres.
     pub body_distance: Vec<f32>,
     /// Cosine between the scan's normal and the body's at the closest place.
-    pub body_facing: Vec<f32>,
+    pub body_alignment: Vec<f32>,
     /// Laplacian scale of `height` on uncovered parts, metres.
     pub height_noise: f32,
     /// Exponential scale of `color` on uncovered parts.
@@ -46,7 +46,7 @@ pub struct Evidence {
 }
 
 /// Measures a take.
-pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Evidence {
+pub fn measure(take: &DressedTake, graph: &ScanGraph, settings: &ExtractSettings) -> Evidence {
     let on_body = on_body(take, graph);
     let before = Before::new(take.previous);
     let compare = |v| before.compare(&take.scan.positions[v], &graph.normals[v], graph.lab.get(v), settings);
@@ -60,10 +60,10 @@ pub fn measure(take: &Take, graph: &ScanGraph, settings: &ExtractSettings) -> Ev
         height,
         clearance: compared.iter().map(|c| c.clearance).collect(),
         color,
-        facing: compared.iter().map(|c| c.facing).collect(),
+        alignment: compared.iter().map(|c| c.alignment).collect(),
         parts,
         body_distance: on_body.iter().map(|b| b.distance).collect(),
-        body_facing: on_body.iter().map(|b| b.facing).collect(),
+        body_alignment: on_body.iter().map(|b| b.alignment).collect(),
         height_noise,
         color_noise,
     }

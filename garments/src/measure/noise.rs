@@ -5,11 +5,11 @@ use toile_geometry::statistics::{Rank, median, quantile_by};
 use super::body_parts::PART_COUNT;
 
 /// Smallest scales that are believed, metres and colour units: no sensor is better.
-const LEAST_DISTANCE_NOISE: f32 = 0.0007;
-const LEAST_COLOR_NOISE: f32 = 1.5;
+const MIN_DISTANCE_NOISE: f32 = 0.0007;
+const MIN_COLOR_NOISE: f32 = 1.5;
 /// Largest scales that uncovered skin can explain, metres and colour units.
-const MOST_DISTANCE_NOISE: f32 = 0.004;
-const MOST_COLOR_NOISE: f32 = 8.0;
+const MAX_DISTANCE_NOISE: f32 = 0.004;
+const MAX_COLOR_NOISE: f32 = 8.0;
 /// A part of the body needs this many vertices to be measured.
 const PART_VERTICES: usize = 150;
 /// The quantile of the parts' medians that is the noise.
@@ -24,8 +24,8 @@ pub(super) fn noise(parts: &[[f32; PART_COUNT]], height: &[f32], color: &[f32]) 
     let scale = 1.5 / std::f32::consts::LN_2;
     let (height, color) = (low(parts, |v| height[v].abs()), low(parts, |v| color[v]));
     [
-        (height * scale).clamp(LEAST_DISTANCE_NOISE, MOST_DISTANCE_NOISE),
-        (color * scale).clamp(LEAST_COLOR_NOISE, MOST_COLOR_NOISE),
+        (height * scale).clamp(MIN_DISTANCE_NOISE, MAX_DISTANCE_NOISE),
+        (color * scale).clamp(MIN_COLOR_NOISE, MAX_COLOR_NOISE),
     ]
 }
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use toile_geometry::bvh::Bvh;
 
 use super::body_parts::{PART_COUNT, part_shares};
-use crate::{measure::scan_graph::ScanGraph, take::Take};
+use crate::{measure::scan_graph::ScanGraph, take::DressedTake};
 
 /// The place of a scan vertex on the body.
 pub(super) struct OnBody {
@@ -13,23 +13,23 @@ pub(super) struct OnBody {
     /// Distance from the body, metres.
     pub distance: f32,
     /// Cosine between the scan's normal and the body's there.
-    pub facing: f32,
+    pub alignment: f32,
 }
 
 /// The place of every scan vertex on the body.
-pub(super) fn on_body(take: &Take, graph: &ScanGraph) -> Vec<OnBody> {
+pub(super) fn on_body(take: &DressedTake, graph: &ScanGraph) -> Vec<OnBody> {
     let body = Bvh::new(&take.body.positions, &take.body.triangles);
     let shares = part_shares(take.weights);
     let normals = take.body.triangle_normals();
     let place = |(p, normal)| {
         let Some(hit) = body.closest(p, f32::INFINITY) else {
-            return OnBody { parts: [0.0; PART_COUNT], distance: f32::INFINITY, facing: 0.0 };
+            return OnBody { parts: [0.0; PART_COUNT], distance: f32::INFINITY, alignment: 0.0 };
         };
         let corners = take.body.triangles[hit.triangle as usize];
         OnBody {
             parts: blend(&shares, corners, hit.barycentric),
             distance: hit.distance,
-            facing: normals[hit.triangle as usize].dot(normal),
+            alignment: normals[hit.triangle as usize].dot(normal),
         }
     };
     take.scan.positions.par_iter().zip(&graph.normals).map(place).collect()

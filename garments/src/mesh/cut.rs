@@ -8,7 +8,7 @@ use crate::measure::scan_graph::ScanGraph;
 /// Cut points keep this share of an edge away from its ends, so that no sliver has an edge of no length.
 const AWAY_FROM_ENDS: f32 = 0.06;
 /// Limit of the smoothing steps.
-const MOST_STEPS: f32 = 200.0;
+const MAX_STEPS: f32 = 200.0;
 
 /// Signed field of a label: +1 inside, −1 outside, diffused over the surface with standard deviation `deviation`
 /// (metres), so that its zero line is the labels' border with the corners taken off.
@@ -17,7 +17,7 @@ pub(super) fn smooth_field(graph: &ScanGraph, inside: &[bool], deviation: f32) -
     let squares: f64 = graph.edges.iter().map(|e| f64::from(length(e).powi(2))).sum();
     let mean_square = (squares / graph.edges.len().max(1) as f64) as f32;
     // Moving half of the value by one edge adds a quarter of the edge's square to the variance along each direction.
-    let steps = (4.0 * deviation * deviation / mean_square.max(1e-9)).ceil().min(MOST_STEPS) as usize;
+    let steps = (4.0 * deviation * deviation / mean_square.max(1e-9)).ceil().min(MAX_STEPS) as usize;
     let weight = |(e, dual): (&[u32; 2], &f32)| (dual / length(e).max(1e-6)).max(0.05);
     let weights: Vec<f32> = graph.edges.iter().zip(&graph.dual_lengths).map(weight).collect();
     let mut field: Vec<f32> = inside.iter().map(|&i| if i { 1.0 } else { -1.0 }).collect();

@@ -19,7 +19,7 @@ pub(crate) enum Channel {
     Unseen,
     /// Distance from what was worn before, metres.
     Clearance,
-    /// What strokes decided: 1 where somebody said that it belongs, −1 that it does not.
+    /// The decisions of strokes: 1 where somebody said that it belongs, −1 that it does not.
     ByHand,
 }
 

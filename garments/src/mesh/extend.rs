@@ -16,7 +16,7 @@ const RIM_STEPS: usize = 12;
 /// Rings of triangles behind the rim between which the cloth's direction is read.
 const CLOTH_RINGS: [usize; 2] = [2, 5];
 /// Narrower strips are not added, metres.
-const LEAST_WIDTH: f32 = 0.001;
+const MIN_WIDTH: f32 = 0.001;
 /// Rims with fewer vertices are left as they are.
 const FEWEST_VERTICES: usize = 8;
 
@@ -61,7 +61,7 @@ fn cloth_normal(normals: &[Vector3<f32>], neighbors: &VertexNeighbors, rim: u32)
 fn add_strip(draft: &mut Draft, rim: &[u32], widths: &[f32], outward: &[Vector3<f32>]) {
     let mut grown = Vec::with_capacity(rim.len());
     for ((&v, &width), out) in rim.iter().zip(widths).zip(outward) {
-        let out = out.try_normalize(0.3).filter(|_| width >= LEAST_WIDTH);
+        let out = out.try_normalize(0.3).filter(|_| width >= MIN_WIDTH);
         grown.push(out.map_or(v, |out| draft.push_moved(v, out * width)));
     }
     for i in 0..rim.len() {

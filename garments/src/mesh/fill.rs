@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Loops with more vertices than this are not closed: triangulating costs the cube.
-const MOST_RIM_VERTICES: usize = 450;
+const MAX_RIM_VERTICES: usize = 450;
 
 /// Closes the scan's own holes whose rims belong to the garment all round, unless a bone passes through them: what
 /// another garment, an arm or the camera's angle hid.
@@ -45,7 +45,7 @@ fn is_cut_by_hand(draft: &Draft, rim: &[u32]) -> bool {
 
 fn fill_where(draft: &mut Draft, wanted: impl Fn(&Draft, &[u32]) -> bool) {
     for rim in boundary_loops(&draft.surface.triangles) {
-        if rim.len() < 3 || rim.len() > MOST_RIM_VERTICES || !wanted(draft, &rim) {
+        if rim.len() < 3 || rim.len() > MAX_RIM_VERTICES || !wanted(draft, &rim) {
             continue;
         }
         // The loop runs along the surface's triangles; the filling runs against it.

@@ -11,7 +11,7 @@ const FOLLOWING_RINGS: usize = 3;
 /// Share of a ring's movement that the next ring makes.
 const FOLLOWING: f32 = 0.6;
 /// Limit of the smoothing steps.
-const MOST_STEPS: f32 = 200.0;
+const MAX_STEPS: f32 = 200.0;
 
 /// Smooths each rim of at least `fewest_vertices` along itself with standard deviation `deviation` metres. Vertices move
 /// along the surface only, so that tubes keep their girth; what lies behind the rim follows, less and less.
@@ -24,7 +24,7 @@ pub(super) fn smooth(mesh: &mut Mesh, deviation: f32, fewest_vertices: usize) {
         let mean_square =
             (0..n).map(|i| (positions[(i + 1) % n] - positions[i]).norm_squared()).sum::<f32>() / n as f32;
         // A step of weights ¼ ½ ¼ adds half of the squared spacing to the variance.
-        let steps = (2.0 * deviation * deviation / mean_square.max(1e-9)).round().min(MOST_STEPS) as usize;
+        let steps = (2.0 * deviation * deviation / mean_square.max(1e-9)).round().min(MAX_STEPS) as usize;
         let soft = smoothed(positions.clone(), steps);
         let rim_normals: Vec<Vector3<f32>> = rim.iter().map(|&v| normals[v as usize]).collect();
         for (((&v, p), s), out) in rim.iter().zip(&positions).zip(&soft).zip(outward(mesh, &rim_normals, &rim)) {

@@ -17,7 +17,7 @@ const NEAR: [f32; 2] = [0.015, 0.03];
 /// The mixture is smoothed over this length, metres.
 const SMOOTHING: f32 = 0.008;
 /// Surfaces face alike up to this angle (cosine).
-const FACING: f32 = 0.3;
+const MIN_COSINE: f32 = 0.3;
 
 /// Gives each of the `layers` (inside to outside, stacked in `pose0`, with their `weights`) the weights of the nearest
 /// layer below where that is close. Layers over bare body keep their own weights, and so does what hangs free
@@ -74,8 +74,8 @@ fn carried(upper: &Mesh, own: &SkinWeights, lowers: &[Lower]) -> SkinWeights {
 /// Weights of vertex `v` mixed with those of the nearest layer below that faces alike; `None` where none is near.
 fn mixed(upper: &Mesh, normals: &[Vector3<f32>], own: &SkinWeights, lowers: &[Lower], v: usize) -> Option<Row> {
     let near = |lower: &Lower| {
-        let facing = |t: u32| lower.normals[t as usize].dot(&normals[v]) > FACING;
-        lower.bvh.closest_where(&upper.positions[v], NEAR[1], facing)
+        let is_alike = |t: u32| lower.normals[t as usize].dot(&normals[v]) > MIN_COSINE;
+        lower.bvh.closest_where(&upper.positions[v], NEAR[1], is_alike)
     };
     let hits = lowers.iter().filter_map(|lower| Some((lower, near(lower)?)));
     let (lower, hit) = hits.min_by(|a, b| a.1.distance.total_cmp(&b.1.distance))?;

@@ -14,7 +14,7 @@ use super::{
 };
 
 /// No triangle may become this many times as long in any direction.
-const MOST_STRETCH: f32 = 2.5;
+const MAX_STRETCH: f32 = 2.5;
 /// Rings of vertices around a triangle that may take over.
 const RINGS: usize = 8;
 /// Limit of the times that all triangles are looked at.
@@ -25,7 +25,7 @@ const SWEEPS: usize = 60;
 /// reach.
 const STRIDES: [[f64; 4]; 3] = [[50.0, 20.0, -25.0, 10.0], [40.0, 90.0, 0.0, 0.0], [10.0, 60.0, -20.0, 40.0]];
 
-/// Evens out `weights` of `mesh` (in `pose0`) until no stride stretches a triangle beyond [`MOST_STRETCH`], as far as that
+/// Evens out `weights` of `mesh` (in `pose0`) until no stride stretches a triangle beyond [`MAX_STRETCH`], as far as that
 /// is possible. Returns the largest stretch before and after. Weights elsewhere stay to the bit, and so do all weights of
 /// a garment without [`FREE_PART`]: it goes where the skin below it goes, which would otherwise cut through it.
 pub(super) fn limit_stretch(mesh: &Mesh, weights: &mut SkinWeights, skeleton: &Skeleton, pose0: &Pose) -> [f32; 2] {
@@ -35,10 +35,10 @@ pub(super) fn limit_stretch(mesh: &Mesh, weights: &mut SkinWeights, skeleton: &S
     let strides = strides(pose0);
     let neighbors = VertexNeighbors::new(mesh.positions.len(), &mesh.triangles);
     let worst = |stretch: &[f32]| stretch.iter().copied().fold(1.0, f32::max);
-    let mut stretch = most_stretches(mesh, weights, skeleton, pose0, &strides);
+    let mut stretch = maximum_stretches(mesh, weights, skeleton, pose0, &strides);
     let before = worst(&stretch);
     for _ in 0..PASSES {
-        let over = mesh.triangles.iter().zip(&stretch).filter(|(_, s)| **s > MOST_STRETCH);
+        let over = mesh.triangles.iter().zip(&stretch).filter(|(_, s)| **s > MAX_STRETCH);
         let seeds: Vec<u32> = over.flat_map(|(t, _)| *t).collect();
         if seeds.is_empty() {
             break;
@@ -48,8 +48,8 @@ pub(super) fn limit_stretch(mesh: &Mesh, weights: &mut SkinWeights, skeleton: &S
         let (part, old_of_new) = mesh.filter_triangles(|t| mesh.triangles[t].iter().all(|&v| near[v as usize]));
         let mut of_part = weights.gather(&old_of_new);
         for _ in 0..SWEEPS {
-            let stretch = most_stretches(&part, &of_part, skeleton, pose0, &strides);
-            if worst(&stretch) <= MOST_STRETCH {
+            let stretch = maximum_stretches(&part, &of_part, skeleton, pose0, &strides);
+            if worst(&stretch) <= MAX_STRETCH {
                 break;
             }
             of_part = drawn_together(&part, &of_part, &stretch);
@@ -57,7 +57,7 @@ pub(super) fn limit_stretch(mesh: &Mesh, weights: &mut SkinWeights, skeleton: &S
         for (new, &old) in old_of_new.iter().enumerate() {
             (weights.joints[old as usize], weights.weights[old as usize]) = (of_part.joints[new], of_part.weights[new]);
         }
-        stretch = most_stretches(mesh, weights, skeleton, pose0, &strides);
+        stretch = maximum_stretches(mesh, weights, skeleton, pose0, &strides);
     }
     [before, worst(&stretch)]
 }
@@ -78,7 +78,13 @@ fn strides(pose0: &Pose) -> Vec<Pose> {
 }
 
 /// The largest stretch of each triangle in any of `poses`.
-fn most_stretches(mesh: &Mesh, weights: &SkinWeights, skeleton: &Skeleton, pose0: &Pose, poses: &[Pose]) -> Vec<f32> {
+fn maximum_stretches(
+    mesh: &Mesh,
+    weights: &SkinWeights,
+    skeleton: &Skeleton,
+    pose0: &Pose,
+    poses: &[Pose],
+) -> Vec<f32> {
     let rest = skinning::unskin(&mesh.positions, weights, &pose0.skinning_transforms(skeleton));
     let mut most = vec![0.0f32; mesh.triangles.len()];
     for pose in poses {
@@ -92,8 +98,8 @@ fn most_stretches(mesh: &Mesh, weights: &SkinWeights, skeleton: &Skeleton, pose0
 fn drawn_together(mesh: &Mesh, weights: &SkinWeights, stretch: &[f32]) -> SkinWeights {
     let mut rows: Vec<Row> = (0..weights.len()).map(|v| row(weights, v)).collect();
     let mut changed = vec![false; rows.len()];
-    for (corners, &s) in mesh.triangles.iter().zip(stretch).filter(|(_, s)| **s > MOST_STRETCH) {
-        let keep = MOST_STRETCH / s;
+    for (corners, &s) in mesh.triangles.iter().zip(stretch).filter(|(_, s)| **s > MAX_STRETCH) {
+        let keep = MAX_STRETCH / s;
         let mean: Row = std::array::from_fn(|j| corners.iter().map(|&v| rows[v as usize][j]).sum::<f32>() / 3.0);
         for &v in corners {
             rows[v as usize].iter_mut().zip(mean).for_each(|(w, mean)| *w = mean + keep * (*w - mean));
@@ -149,7 +155,7 @@ mod tests {
         }
         let given = weights.clone();
         let [before, after] = limit_stretch(&mesh, &mut weights, &skeleton, &pose0);
-        assert!(before > 5.0 && after <= MOST_STRETCH * 1.01, "{before} {after}");
+        assert!(before > 5.0 && after <= MAX_STRETCH * 1.01, "{before} {after}");
         for v in (0..weights.len()).filter(|&v| mesh.positions[v].x.abs() > 0.11) {
             assert_eq!((weights.joints[v], weights.weights[v]), (given.joints[v], given.weights[v]));
         }

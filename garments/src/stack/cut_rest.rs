@@ -11,7 +11,7 @@ use super::{
 };
 
 /// More than this share of a layer's triangles is not cut: such a layer cannot be parted.
-const MOST: f32 = 0.005;
+const MAX_SHARE: f32 = 0.005;
 /// At least this much must be left of the gap that a contact aims at, metres.
 const TOO_NEAR: f32 = 0.001;
 
@@ -30,7 +30,7 @@ pub(super) fn cut_rest(layers: &mut [Layer], upper: usize, own_before: &[[u32; 2
     let near: BTreeSet<u32> = left.iter().filter(lacks).map(|c| c.upper.nearest_corner()).collect();
     let at_near = |t: &u32| mesh.triangles[*t as usize].iter().any(|v| near.contains(v));
     cut.extend((0..mesh.triangles.len() as u32).filter(at_near));
-    if cut.is_empty() || cut.len() as f32 > MOST * mesh.triangles.len() as f32 {
+    if cut.is_empty() || cut.len() as f32 > MAX_SHARE * mesh.triangles.len() as f32 {
         return 0;
     }
     let mut rest = mesh.clone();

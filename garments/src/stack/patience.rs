@@ -3,7 +3,7 @@
 /// Rounds without progress after which layers are made smooth around what is left.
 const PATIENCE: usize = 4;
 /// They are made smooth this many times wider at most.
-const MOST_FAIR: usize = 3;
+const MAX_FAIR: usize = 3;
 
 /// Counts rounds without progress.
 #[derive(Default)]
@@ -29,7 +29,7 @@ impl Patience {
         if self.since <= PATIENCE {
             return true;
         }
-        let lost = if 2 * left < self.left_then { 1 } else { (self.lost + 1).min(MOST_FAIR) };
+        let lost = if 2 * left < self.left_then { 1 } else { (self.lost + 1).min(MAX_FAIR) };
         *self = Self { lost, left_then: left, ..Self::default() };
         false
     }

@@ -16,7 +16,7 @@ use super::{
 use crate::{mesh::untangle::untangle_but, settings::StackSettings};
 
 /// Crossings are pushed by at most this many gaps a round.
-const MOST_CROSSING: f32 = 3.0;
+const MAX_CROSSING: f32 = 3.0;
 /// A crossing asks for this many more gaps each round, until it gives way.
 const MORE_EACH_ROUND: f32 = 0.25;
 /// With fewer samples than this that lack their gap, crossings are looked for too.
@@ -44,7 +44,7 @@ pub(super) fn part(region: &Region, layers: &[Layer], settings: &StackSettings) 
     for round in 0..settings.rounds {
         let mut found = contacts.samples(&pile.layers, settings.reach);
         if fresh || found.len() < FEW || patience.rounds % LOOK_AGAIN == LOOK_AGAIN - 1 {
-            let gaps = (1.0 + MORE_EACH_ROUND * patience.rounds as f32).min(MOST_CROSSING);
+            let gaps = (1.0 + MORE_EACH_ROUND * patience.rounds as f32).min(MAX_CROSSING);
             found.extend(contacts.crossings(&pile.layers, gaps));
         }
         found.retain(|c| c.upper.corners.iter().any(|&v| !pile.held[c.upper.layer][v as usize]));

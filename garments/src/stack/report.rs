@@ -1,4 +1,4 @@
-//! What stacking did to each layer.
+//! The effect of stacking on each layer.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ use crate::settings::StackSettings;
 /// Upper ends of the bins of [`LayerReport::gaps`], millimetres.
 pub const GAP_BINS_MM: [f32; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
 
-/// What stacking did to one layer.
+/// The effect of stacking on one layer.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct LayerReport {
     /// Maximum over the regions of the rounds until nothing was left to push; the limit where something was left.
@@ -44,7 +44,7 @@ pub struct LayerReport {
     pub moved_seen_p95_m: f32,
 }
 
-/// What stacking did.
+/// The effect of stacking.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct StackReport {
     /// By layer, inside to outside.

@@ -1,4 +1,4 @@
-//! What layers do in other poses when they follow their skin weights alone: crossings between them, and stretch.
+//! Layers in other poses, when they follow their skin weights alone: crossings between them, and stretch.
 
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ pub struct Worn<'a> {
     pub weights: &'a SkinWeights,
 }
 
-/// What one layer does in other poses.
+/// One layer in other poses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct PosedReport {
     /// Poses that were looked at.

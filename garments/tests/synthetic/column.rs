@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use toile_character::{JOINT_COUNT, Joint, Pose, Skeleton, SkinWeights};
-use toile_garments::{ExtractSettings, Extraction, GarmentType, Take, extract};
+use toile_garments::{DressedTake, ExtractSettings, Extraction, GarmentType, extract};
 use toile_geometry::Mesh;
 
 pub const SKIN: [u8; 3] = [205, 160, 140];
@@ -74,8 +74,8 @@ pub fn person() -> Person {
     Person { body, weights, skeleton: Skeleton { rest } }
 }
 
-pub fn take<'a>(person: &'a Person, scan: &'a Mesh, previous: &'a Mesh, pose: &'a Pose) -> Take<'a> {
-    Take {
+pub fn take<'a>(person: &'a Person, scan: &'a Mesh, previous: &'a Mesh, pose: &'a Pose) -> DressedTake<'a> {
+    DressedTake {
         scan,
         previous,
         body: &person.body,
@@ -89,7 +89,7 @@ pub fn take<'a>(person: &'a Person, scan: &'a Mesh, previous: &'a Mesh, pose: &'
 }
 
 /// The garment of a take by the default settings.
-pub fn extracted(take: &Take) -> Extraction {
+pub fn extracted(take: &DressedTake) -> Extraction {
     extract(take, &ExtractSettings::default(), &|_| ()).unwrap()
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 use toile_character::Pose;
 use toile_garments::{
-    EDITS_VERSION, EditName, Edits, ExtractSettings, GROWTH, HemLine, Mark, Stroke, Take, Warning, extract,
+    DressedTake, EDITS_VERSION, EditName, Edits, ExtractSettings, GROWTH, HemLine, Mark, Stroke, Warning, extract,
 };
 use toile_geometry::{Mesh, bvh::Bvh, topology::boundary_loops};
 
@@ -18,7 +18,7 @@ fn stroke(mark: Mark, at: Point3<f32>, radius: f32) -> Edits {
 fn a_stroke_changes_its_neighbourhood_and_nothing_else() {
     let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
     let run = |edits: Option<&Edits>| {
-        let take = Take { edits, ..take(&person, &scan, &before, &pose) };
+        let take = DressedTake { edits, ..take(&person, &scan, &before, &pose) };
         extracted(&take)
     };
     let plain = run(None);
@@ -44,7 +44,7 @@ fn a_stroke_changes_its_neighbourhood_and_nothing_else() {
 fn the_garments_mesh_shows_what_strokes_say() {
     let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
     let run = |edits: Option<&Edits>| {
-        let take = Take { edits, ..take(&person, &scan, &before, &pose) };
+        let take = DressedTake { edits, ..take(&person, &scan, &before, &pose) };
         extracted(&take).garment
     };
     let nearest =
@@ -74,7 +74,7 @@ fn the_hem_follows_a_line() {
         .collect();
     let hems = vec![HemLine { points, reach: 0.035 }];
     let edits = Edits { version: EDITS_VERSION, strokes: Vec::new(), hems };
-    let take = Take { edits: Some(&edits), ..take(&person, &scan, &before, &pose) };
+    let take = DressedTake { edits: Some(&edits), ..take(&person, &scan, &before, &pose) };
     let found = extracted(&take);
     let top = boundary_loops(&found.garment.triangles)
         .into_iter()
@@ -92,7 +92,7 @@ fn bad_edits_are_refused_by_name() {
     let refuse = |change: &dyn Fn(&mut Edits)| {
         let mut bad = good.clone();
         change(&mut bad);
-        let take = Take { edits: Some(&bad), ..take(&person, &scan, &before, &pose) };
+        let take = DressedTake { edits: Some(&bad), ..take(&person, &scan, &before, &pose) };
         extract(&take, &ExtractSettings::default(), &|_| ()).unwrap_err().to_string()
     };
     assert!(refuse(&|e| e.version = 9).contains("version 9"));
@@ -111,7 +111,7 @@ fn hem_lines_away_from_the_hem_change_nothing_and_are_reported() {
         let angle = |i: usize| (i % 60) as f32 / 60.0 * std::f32::consts::TAU;
         (0..=60).map(|i| [radius * angle(i).sin(), y, radius * angle(i).cos()]).collect()
     };
-    let run = |edits: Option<&Edits>| extracted(&Take { edits, ..take(&person, &scan, &before, &pose) });
+    let run = |edits: Option<&Edits>| extracted(&DressedTake { edits, ..take(&person, &scan, &before, &pose) });
     let plain = run(None);
     // On the garment's middle, and on bare skin; the hems lie at 0.3 and 0.8.
     for (y, radius, far) in [(0.55, RADIUS + 0.01, 0.25), (0.95, RADIUS, 0.15)] {
@@ -136,7 +136,7 @@ fn strokes_that_touch_nothing_are_reported() {
     let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
     let at = Point3::new(0.0, 0.55, RADIUS + 0.03);
     let edits = stroke(Mark::DoesNotBelong, at, 0.01);
-    let found = extracted(&Take { edits: Some(&edits), ..take(&person, &scan, &before, &pose) });
+    let found = extracted(&DressedTake { edits: Some(&edits), ..take(&person, &scan, &before, &pose) });
     let [Warning::EditWithoutEffect(edit)] = found.warnings[..] else { panic!("{:?}", found.warnings) };
     assert_eq!((edit.edit, edit.radius_m), (EditName::Stroke(1), 0.01));
     assert!((edit.distance_m - 0.02).abs() < 0.002 && found.report.edited_m2 == 0.0, "{edit:?}");

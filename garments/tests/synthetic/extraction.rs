@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use toile_character::{Joint, Pose, SkinWeights, skinning};
-use toile_garments::{ExtractSettings, GarmentError, GarmentType, Take, Warning, extract};
+use toile_garments::{DressedTake, ExtractSettings, GarmentError, GarmentType, Warning, extract};
 use toile_geometry::{
     Mesh,
     topology::{boundary_loops, loop_length},
@@ -109,11 +109,11 @@ fn a_bent_take_comes_back_to_the_common_frame() {
 }
 
 #[test]
-fn told_types_are_kept_and_others_guessed() {
+fn given_types_are_kept_and_others_guessed() {
     let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
     let mut input = take(&person, &scan, &before, &pose);
-    let told = extracted(&input).report;
-    assert!((told.garment_type, told.type_guessed) == (GarmentType::Other, false));
+    let reported = extracted(&input).report;
+    assert!((reported.garment_type, reported.type_guessed) == (GarmentType::Other, false));
     input.garment_type = None;
     let guessed = extracted(&input).report;
     assert!((guessed.garment_type, guessed.type_guessed) == (GarmentType::Top, true), "{guessed:?}");
@@ -122,7 +122,7 @@ fn told_types_are_kept_and_others_guessed() {
 #[test]
 fn bad_input_is_refused() {
     let (person, pose, before, empty) = (person(), Pose::identity(), bare(), Mesh::default());
-    let refuse = |take: &Take| extract(take, &ExtractSettings::default(), &|_| ()).unwrap_err();
+    let refuse = |take: &DressedTake| extract(take, &ExtractSettings::default(), &|_| ()).unwrap_err();
     assert_eq!(refuse(&take(&person, &empty, &before, &pose)), GarmentError::Empty("scan"));
     let mut broken = before.clone();
     broken.positions[3].x = f32::NAN;

@@ -74,7 +74,7 @@ fn two_garments_at_once_are_one_layer_with_a_warning() {
 }
 
 #[test]
-fn a_bare_arm_that_touches_the_torso_is_no_cloth() {
+fn a_bare_arm_that_touches_the_torso_is_not_cloth() {
     let angle = |p: &Point3<f32>| p.x.atan2(p.z).rem_euclid(std::f32::consts::TAU);
     // The arm is a ridge on the torso's side, a part of the same surface.
     let arm = |y: f32, a: f32| (0.4..0.9).contains(&y) && (a - 1.6).abs() < 0.45;

@@ -2,7 +2,8 @@
 
 use toile_character::Pose;
 use toile_garments::{
-    ExtractSettings, GarmentError, GarmentType, Labelling, Reason, StackMethod, StackSettings, Take, extract, stack,
+    DressedTake, ExtractSettings, GarmentError, GarmentType, Labelling, Reason, StackMethod, StackSettings, extract,
+    stack,
 };
 
 use crate::{column::*, stacking::crossing_layers};
@@ -14,7 +15,7 @@ fn seed_settings() -> ExtractSettings {
 #[test]
 fn labels_are_those_of_the_template_at_the_nearest_body_vertex() {
     let (person, pose, before, scan) = (person(), Pose::identity(), bare(), dressed(0.01, BLUE));
-    let take = Take { garment_type: Some(GarmentType::Top), ..take(&person, &scan, &before, &pose) };
+    let take = DressedTake { garment_type: Some(GarmentType::Top), ..take(&person, &scan, &before, &pose) };
     let found = extract(&take, &seed_settings(), &|_| ()).unwrap();
     assert!(found.labels.reasons.iter().all(|r| *r == Reason::Template));
     // A top covers pelvis and torso: all below the head, which starts at 0.8, whatever the scan shows.

@@ -88,7 +88,7 @@ fn refitted_answers_as_built_anew() {
 }
 
 #[test]
-fn winding_number_tells_inside_from_outside() {
+fn winding_number_distinguishes_inside_from_outside() {
     let (positions, triangles) = sphere(3);
     let bvh = Bvh::new(&positions, &triangles);
     for p in probes().filter(|p| (p.coords.norm() - 1.0).abs() > 0.03) {

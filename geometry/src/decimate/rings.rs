@@ -1,4 +1,4 @@
-//! What lies around an edge.
+//! The surroundings of an edge.
 
 use super::corners::Corners;
 

@@ -13,7 +13,7 @@ const NONE: u32 = u32::MAX;
 
 /// The shortest simple cycle of inner vertices, at most `longest` metres long, that does not bound a part of the
 /// surface (borders count as closed). `None` where there is none.
-pub fn shortest(mesh: &Mesh, longest: f32) -> Option<Vec<u32>> {
+pub fn shortest_cycle(mesh: &Mesh, longest: f32) -> Option<Vec<u32>> {
     let edges = Edges::new(&mesh.triangles);
     if edges.uses.iter().any(|&u| u > 2) {
         return None;
@@ -125,7 +125,7 @@ struct Search {
     /// Distance from the base, the way back, and which generators the path crosses.
     reached: Vec<(f32, u32, u64)>,
     touched: Vec<u32>,
-    shortest: f32,
+    limit: f32,
     found: Option<Vec<u32>>,
 }
 
@@ -133,7 +133,7 @@ const FAR: (f32, u32, u64) = (f32::INFINITY, NONE, 0);
 
 impl Search {
     fn new(count: usize, longest: f32) -> Self {
-        Self { reached: vec![FAR; count], touched: Vec::new(), shortest: longest, found: None }
+        Self { reached: vec![FAR; count], touched: Vec::new(), limit: longest, found: None }
     }
 
     fn from(&mut self, graph: &Graph, base: u32) {
@@ -142,7 +142,7 @@ impl Search {
         while let Some(Reverse((bits, v))) = heap.pop() {
             let (distance, _, crossed) = self.reached[v as usize];
             // Distances are not negative: their bits are in their order.
-            if f32::from_bits(bits) > distance || 2.0 * distance > self.shortest {
+            if f32::from_bits(bits) > distance || 2.0 * distance > self.limit {
                 continue;
             }
             for &(to, edge) in graph.around[v as usize].iter().filter(|n| !graph.on_border[n.0 as usize]) {
@@ -168,7 +168,7 @@ impl Search {
 
     /// The two ways from the base, where they are the shortest loop so far: without the part that they share.
     fn close(&mut self, v: u32, to: u32, length: f32) {
-        if length >= self.shortest {
+        if length >= self.limit {
             return;
         }
         let way = |mut at: u32| {
@@ -188,7 +188,7 @@ impl Search {
         one.reverse();
         one.extend(other);
         if one.len() > 2 {
-            self.shortest = length;
+            self.limit = length;
             self.found = Some(one);
         }
     }

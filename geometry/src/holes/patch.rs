@@ -13,7 +13,7 @@ const LONG: f64 = 1.5;
 /// Passes of tightening.
 const TIGHTENING: usize = 200;
 /// Maximum number of vertices of a patch.
-const MOST_VERTICES: usize = 20_000;
+const MAX_VERTICES: usize = 20_000;
 
 /// Vertices (border first, in its order) and triangles of a patch.
 #[derive(Debug, Clone)]
@@ -45,7 +45,7 @@ impl Patch {
             if split > 0 {
                 self.even_out(3);
             }
-            if split == 0 && flips == 0 || self.positions.len() > MOST_VERTICES {
+            if split == 0 && flips == 0 || self.positions.len() > MAX_VERTICES {
                 break;
             }
         }
@@ -86,7 +86,7 @@ impl Patch {
         let mut touched = vec![false; self.triangles.len()];
         let mut count = 0;
         for (_, (a, b), sides) in long {
-            if sides.iter().any(|&t| touched[t]) || self.positions.len() > MOST_VERTICES {
+            if sides.iter().any(|&t| touched[t]) || self.positions.len() > MAX_VERTICES {
                 continue;
             }
             let middle = nalgebra::center(&self.positions[a as usize], &self.positions[b as usize]);

@@ -73,9 +73,9 @@ pub trait Lanes: Copy + Send + Sync {
     fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F;
     /// Whole floats from 0 to 2²⁴ as integers.
     fn indices(self, a: Self::F) -> [u32; LANES];
-    /// Surface elements from depth, facing, and the normal's x and y.
+    /// Surface elements from depth, slant, and the normal's x and y.
     fn pack(self, parts: [Self::F; 4]) -> [Element; LANES];
-    /// Depth, facing, and the normal's x and y of surface elements, in halves as they are gathered.
+    /// Depth, slant, and the normal's x and y of surface elements, in halves as they are gathered.
     fn unpack(self, elements: [[Element; LANES / 2]; 2]) -> [Self::F; 4];
     /// The four bytes of each value, in halves as they are gathered.
     fn bytes(self, values: [[[u8; 4]; LANES / 2]; 2]) -> [Self::F; 4];

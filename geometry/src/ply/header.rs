@@ -65,7 +65,7 @@ pub(super) struct Element {
     pub properties: Vec<Property>,
 }
 
-/// What the header says.
+/// The content of the header.
 pub(super) struct Header {
     pub format: Format,
     pub elements: Vec<Element>,
@@ -82,7 +82,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Header, &[u8]), String> {
     let mut header = Header { format: Format::Ascii, elements: Vec::new() };
     text.lines().try_for_each(|line| read_line(&mut header, line))?;
     match header.elements.iter().find(|e| e.count > 0 && e.properties.is_empty()) {
-        Some(element) => Err(format!("the header gives element \"{}\" no property", element.name)),
+        Some(element) => Err(format!("element \"{}\" of the header lacks properties", element.name)),
         None => Ok((header, body)),
     }
 }

@@ -1,4 +1,4 @@
-//! What the report shows, and in which order.
+//! The contents of the report, in their order.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -36,7 +36,7 @@ pub struct Contents {
     pub sections: Vec<(String, f64)>,
     /// The body standing straight.
     pub standing: Mesh,
-    /// What is to be said.
+    /// The remarks.
     pub remarks: Remarks,
     /// Scan of each take by layer name.
     pub scans: Vec<(String, Mesh)>,
@@ -150,7 +150,10 @@ fn body(page: &mut Page, contents: &Contents, drawn: DrawnPictures) -> Result<()
         page.subsection("Sections of scan (blue) and body (red)");
         page.pictures(Width::Small, &drawn(pictures::sections(scan, &contents.body, &contents.sections))?)?;
     }
-    page.section("Measurements", "ISO 8559-1, standing straight; the red lines show where each was taken.");
+    page.section(
+        "Measurements",
+        "By the definitions of ISO 8559-1, standing straight; the red lines show where each was taken.",
+    );
     page.pictures(Width::Small, &drawn(pictures::measured(&contents.standing, &contents.tapes))?)?;
     let rows: Vec<Vec<String>> = contents.measurements.iter().map(|(k, v)| vec![k.clone(), v.clone()]).collect();
     page.table(&["measurement", "value"], &rows, &[]);
@@ -174,4 +177,33 @@ fn figures_table(page: &mut Page, corner: &str, figures: &Figures, layers: &[Str
     let head: Vec<&str> = std::iter::once(corner).chain(figures.layers.iter().map(String::as_str)).collect();
     let row = |(what, values): &(&'static str, Vec<String>)| [vec![what.to_string()], values.clone()].concat();
     page.table(&head, &figures.rows.iter().map(row).collect::<Vec<_>>(), layers);
+}
+
+#[cfg(test)]
+mod tests {
+    use toile_garments::PosedReport;
+
+    use super::*;
+    use crate::look::Look;
+
+    #[test]
+    fn crossings_in_the_motion_stand_under_what_to_worry_about() {
+        let calm = PosedReport::default();
+        let crossed = PosedReport { crossing_pairs_most: 45, ..calm.clone() };
+        let look = Look {
+            motion: "walk".into(),
+            layers: vec!["01-trousers".into()],
+            in_motion: vec![crossed],
+            in_t_pose: vec![calm],
+        };
+        let mut page = Page::new("anna", "");
+        let remarks = Remarks { warnings: look.warnings(), ..Remarks::default() };
+        worries(&mut page, &remarks, &["01-trousers".into()]);
+        let html = page.finish();
+        let (_, below) = html.split_once("What to worry about</h2>").unwrap();
+        assert!(
+            below.contains("Look at it</h3>") && below.contains("in the motion `walk` a layer below pokes through it")
+        );
+        assert!(below.contains("up to 45 pairs") && !below.contains("Nothing: every take is whole"), "{below}");
+    }
 }

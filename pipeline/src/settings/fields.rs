@@ -1,4 +1,4 @@
-//! What is known of each setting: what it does, its unit, and its range or choices.
+//! Facts about each setting: its effect, its unit, and its range or choices.
 
 /// A setting.
 pub struct Field {
@@ -10,7 +10,7 @@ pub struct Field {
     pub range: Option<[f64; 2]>,
     /// The words that it may be.
     pub choices: &'static [&'static str],
-    /// What it does.
+    /// Its effect.
     pub about: &'static str,
 }
 
@@ -43,11 +43,15 @@ pub const FIELDS: &[Field] = &[
         [0.001, 1.0],
         "Truncation distance of the signed distance field; at least two voxels.",
     ),
-    choice("fusion.volume", &["auto", "all"], "What is fused: the person who turns, or everything that was seen."),
+    choice(
+        "fusion.volume",
+        &["auto", "all"],
+        "The surfaces that are fused: the person who turns, or everything that was seen.",
+    ),
     choice(
         "fusion.prior",
         &["turntable", "none"],
-        "What is assumed about the motion: a turn about a resting axis, or nothing.",
+        "The assumption about the motion: a turn about a resting axis, or nothing.",
     ),
     switch("fusion.poses", "Known poses instead of tracking; set by `toile fuse --poses`."),
     number(
@@ -100,7 +104,7 @@ pub const FIELDS: &[Field] = &[
         "fit.shape_sigma",
         "standard deviations",
         [0.01, 100.0],
-        "What the shape prior gives each coefficient; larger trusts the scan more.",
+        "Weight of each coefficient against the shape prior; larger trusts the scan more.",
     ),
     number(
         "fit.noise",
@@ -207,7 +211,7 @@ pub const FIELDS: &[Field] = &[
         "extract.edge_loss",
         "metres",
         [0.0, 0.1],
-        "What a scan lacks at the edge of cloth that nothing lies close behind; 0 trusts the scan's edge.",
+        "Width that a scan lacks at the edge of cloth that nothing lies close behind; 0 trusts the scan's edge.",
     ),
     number(
         "extract.rim_smoothing",

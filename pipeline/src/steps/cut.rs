@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use toile_capture::files::read_bytes;
 use toile_fitting::rigged_scan;
-use toile_garments::{Edits, Extraction, ExtractionReport, Take, Warning, extract};
+use toile_garments::{DressedTake, Edits, Extraction, ExtractionReport, Warning, extract};
 use toile_geometry::ply;
 
 use crate::{
@@ -46,7 +46,7 @@ impl Cut<'_> {
         Some(self.run.folders.edits(self.layer())).filter(|path| path.exists())
     }
 
-    /// What is to be said of what was found.
+    /// Remarks about the findings.
     fn remarks(&self, found: &Extraction) -> Remarks {
         let layer = self.layer();
         let (nothing, other): (Vec<_>, Vec<_>) = found.warnings.iter().partition(|w| **w == Warning::NothingNew);
@@ -102,7 +102,7 @@ impl Step for Cut<'_> {
         let (scan, scan_before) = (read_mesh(&path)?, read_mesh(&folders.scan(self.worn_as))?);
         let (pose, pose_before) = (read_pose(&folders.pose(self.layer()))?, read_pose(&folders.pose(self.worn_as))?);
         let edits = self.edits().as_deref().map(read_edits).transpose()?;
-        let take = Take {
+        let take = DressedTake {
             scan: &scan,
             previous: &rigged_scan(&scan_before, &body.skinned, &pose_before).posed_mesh(&pose),
             body: &body.skinned.posed_mesh(&pose),

@@ -32,18 +32,18 @@ pub struct Export<'a> {
     pub body: &'a Body,
     /// The garments, inside to outside.
     pub garments: &'a [Garment],
-    /// What the avatar is made with.
+    /// The choices that the avatar is made with.
     pub choice: &'a AvatarChoice,
 }
 
-/// What the export decided.
+/// The decisions of the export.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Exported {
     /// How the motion was carried over.
     pub motion: RetargetReport,
     /// Triangles that were left out because clothes hide them, by layer; empty where every layer is whole.
     pub left_out: BTreeMap<String, LeftOut>,
-    /// What the layers do in the exported motion and in the T-pose of the VRM file.
+    /// The layers in the exported motion and in the T-pose of the VRM file.
     pub look: Look,
 }
 
@@ -194,14 +194,14 @@ mod tests {
         let layers = vec![body.clone(), vest, coat.clone()];
         let (name, joint_names, pose0) = ("anna".into(), JointNaming::Vrm, Pose::identity());
         let mut avatar = Avatar { name, skeleton, joint_names, pose0, layers, motions: Vec::new() };
-        let told = leave_out_hidden(&mut avatar, &CullSettings { margin: 0.03, reach: 0.1 }).unwrap();
+        let reported = leave_out_hidden(&mut avatar, &CullSettings { margin: 0.03, reach: 0.1 }).unwrap();
         avatar.validate().unwrap();
         assert_eq!(avatar.layers.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(), ["body", "02-coat"]);
-        assert_eq!(told["01-vest"], LeftOut { triangles: 32, of: 32 });
-        assert_eq!(told["02-coat"], LeftOut { triangles: 0, of: 800 });
+        assert_eq!(reported["01-vest"], LeftOut { triangles: 32, of: 32 });
+        assert_eq!(reported["02-coat"], LeftOut { triangles: 0, of: 800 });
         let left = &avatar.layers[0];
-        assert_eq!(told["body"], LeftOut { triangles: 1800 - left.mesh.triangles.len(), of: 1800 });
-        assert!((1000..1600).contains(&left.mesh.triangles.len()), "{told:?}");
+        assert_eq!(reported["body"], LeftOut { triangles: 1800 - left.mesh.triangles.len(), of: 1800 });
+        assert!((1000..1600).contains(&left.mesh.triangles.len()), "{reported:?}");
         assert!(left.mesh.positions.len() < body.mesh.positions.len());
         for (v, p) in left.mesh.positions.iter().enumerate() {
             let old = body.mesh.positions.iter().position(|q| q == p).unwrap();

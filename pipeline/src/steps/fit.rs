@@ -21,7 +21,7 @@ use crate::{
     step::{Product, Step},
 };
 
-/// What a fit writes into the body's folder.
+/// The files that a fit writes into the body's folder.
 pub const FILES: [&str; 8] = [
     "body.ply",
     "model.ply",

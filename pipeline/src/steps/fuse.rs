@@ -22,7 +22,7 @@ pub struct Fuse<'a> {
     pub recording: PathBuf,
     /// Folder of the files.
     pub folder: PathBuf,
-    /// What the take is called.
+    /// The name of the take.
     pub name: String,
     /// How it is fused.
     pub settings: &'a FusionSettings,

@@ -21,7 +21,7 @@ use crate::{
     motion,
     report::{self, Contents, Figures},
     step::{Product, Step},
-    summary::{Summary, Take},
+    summary::{Summary, TakeSummary},
 };
 
 /// Times of the motion that are shown.
@@ -35,9 +35,9 @@ pub struct Page<'a> {
     pub body: &'a Body,
     /// The garments, inside to outside.
     pub garments: &'a [Garment],
-    /// What the avatar was made with.
+    /// The choices that the avatar was made with.
     pub choice: &'a AvatarChoice,
-    /// What the other steps decided and said.
+    /// The decisions and remarks of the other steps.
     pub summary: &'a Summary,
 }
 
@@ -120,7 +120,7 @@ impl Page<'_> {
         })
     }
 
-    /// What stacking moved, and what the layers do in the motion and in the T-pose.
+    /// The moves of stacking, and the layers in the motion and in the T-pose.
     fn of_garments(&self) -> Figures {
         let mut figures = Figures { layers: self.garments.iter().map(|g| g.layer.clone()).collect(), rows: Vec::new() };
         let decided = &self.summary.decided;
@@ -197,7 +197,7 @@ impl Page<'_> {
 /// A row of a table: what it shows, and its value for a layer.
 type Row<R> = (&'static str, fn(&R) -> String);
 
-/// What stacking did to a garment; "seen" is where the scan saw it.
+/// A garment after stacking; "seen" is where the scan saw it.
 const REST: [Row<LayerReport>; 6] = [
     ("moved where seen, mean mm", |l| format!("{:.2}", 1e3 * l.moved_seen_mean_m)),
     ("moved where seen, p95 mm", |l| format!("{:.2}", 1e3 * l.moved_seen_p95_m)),
@@ -207,7 +207,7 @@ const REST: [Row<LayerReport>; 6] = [
     ("self-crossings added", |l| l.self_crossings[1].saturating_sub(l.self_crossings[0]).to_string()),
 ];
 
-/// What a garment does in the motion.
+/// A garment in the motion.
 const MOVING: [Row<PosedReport>; 4] = [
     ("poked through in the motion, pairs", |p| format!("{:.0}", p.crossing_pairs_mean)),
     ("the same in the worst pose", |p| p.crossing_pairs_most.to_string()),
@@ -215,14 +215,14 @@ const MOVING: [Row<PosedReport>; 4] = [
     ("largest stretch in the motion", |p| format!("{:.1}", p.stretch_most)),
 ];
 
-/// What a garment does in the T-pose.
+/// A garment in the T-pose.
 const T_POSE: [Row<PosedReport>; 2] = [
     ("poked through in the T-pose, pairs", |p| p.crossing_pairs_most.to_string()),
     ("largest stretch in the T-pose", |p| format!("{:.1}", p.stretch_most)),
 ];
 
-/// What the steps of each take decided, in figures.
-fn of_takes(takes: &[Take]) -> Figures {
+/// The decisions of the steps of each take, in figures.
+fn of_takes(takes: &[TakeSummary]) -> Figures {
     let mut figures = Figures { layers: takes.iter().map(|t| t.layer.clone()).collect(), rows: Vec::new() };
     for (what, of) in TAKES {
         figures.row(what, takes.iter().map(of).collect());
@@ -230,7 +230,7 @@ fn of_takes(takes: &[Take]) -> Figures {
     figures
 }
 
-const TAKES: [Row<Take>; 10] = [
+const TAKES: [Row<TakeSummary>; 10] = [
     ("frames fused", |t| t.fuse.frames_fused.to_string()),
     ("left out", |t| t.fuse.dropped.len().to_string()),
     ("turned, °", |t| format!("{:.0}", t.fuse.turned_deg)),

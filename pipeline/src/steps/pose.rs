@@ -32,12 +32,12 @@ pub struct PoseUnder<'a> {
     pub model: &'a BodyModel,
 }
 
-/// What posing decided.
+/// The decisions of posing.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct PoseReport {
     /// How well the person of an earlier take was found in this one.
     pub pose: UnderReport,
-    /// What settling the body moved.
+    /// The moves of settling the body.
     pub settle: SettleReport,
     /// The earlier take that this one is worn as, with one layer more.
     pub worn_as_in: String,
@@ -113,7 +113,7 @@ impl Step for PoseUnder<'_> {
     }
 }
 
-/// What to say of take `layer`, which is worn as the first of `since` was.
+/// Remarks about take `layer`, which is worn as the first of `since` was.
 fn warnings(layer: &str, fit: &UnderReport, since: &[String]) -> Vec<String> {
     let mut warnings: Vec<String> = fit.reasons.iter().map(|r| format!("{layer}: pose: {r}")).collect();
     if let [same, missing @ ..] = since

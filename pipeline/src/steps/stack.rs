@@ -30,7 +30,7 @@ pub struct Stack<'a> {
     pub garments: &'a [Garment],
 }
 
-/// What stacking decided, by garment from inside to outside.
+/// The decisions of stacking, by garment from inside to outside.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Stacked {
     /// How each was moved.
@@ -97,7 +97,7 @@ fn free_share(mesh: &Mesh) -> Option<f32> {
     Some(free.iter().sum::<f32>() / free.len().max(1) as f32)
 }
 
-/// What is to be looked at in the pose of the scans.
+/// Places to look at in the pose of the scans.
 fn warnings(layer: &str, report: &LayerReport) -> Vec<String> {
     let (pairs, cut, [before, after]) = (report.crossing_pairs, report.cut_triangles, report.self_crossings);
     let found = [

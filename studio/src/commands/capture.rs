@@ -35,10 +35,10 @@ pub struct Capture {
     /// The subject's folder
     #[arg(long, value_name = "DIR")]
     subject: PathBuf,
-    /// What the take adds, without a number: body, trousers, shirt, ...
+    /// The addition of the take, without a number: body, trousers, shirt, ...
     #[arg(long, value_name = "NAME")]
     layer: String,
-    /// What garment it is: top, trousers, skirt, dress, jacket, other
+    /// The type of the garment: top, trousers, skirt, dress, jacket, other
     #[arg(long = "type", value_name = "TYPE")]
     garment: Option<GarmentType>,
     /// Where frames come from
@@ -166,6 +166,6 @@ fn interrupted() -> Result<Arc<AtomicBool>, StudioError> {
     let pressed = Arc::new(AtomicBool::new(false));
     flag::register_conditional_shutdown(SIGINT, 1, pressed.clone())
         .and_then(|_| flag::register(SIGINT, pressed.clone()))
-        .map_err(|e| StudioError::Device(format!("Ctrl-C cannot be watched: {e}")))?;
+        .map_err(StudioError::Signal)?;
     Ok(pressed)
 }

@@ -43,10 +43,10 @@ impl Demo {
     /// Runs the command.
     ///
     /// # Errors
-    /// [`StudioError`] where no session is found or it cannot be copied; what processing says.
+    /// [`StudioError`] where no session is found or it cannot be copied; the error of processing.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         let recorded = self.recorded.clone().or_else(find_recorded).ok_or_else(|| {
-            StudioError::Usage("no folder recorded/ above here or the program; give it with --recorded DIR".into())
+            StudioError::Usage("the folder recorded/ was not found above the current folder or the program; give it with --recorded DIR".into())
         })?;
         let subjects = subjects_in(&recorded)?;
         let out = self.out.clone().unwrap_or_else(|| recorded.parent().unwrap_or(Path::new(".")).join("demo"));
@@ -80,7 +80,7 @@ fn subjects_in(recorded: &Path) -> Result<Vec<PathBuf>, StudioError> {
         entries.flatten().map(|e| e.path()).filter(|p| p.join("subject.toml").is_file()).collect();
     subjects.sort();
     if subjects.is_empty() {
-        return Err(StudioError::format(recorded, "there is no subject in it (no */subject.toml)"));
+        return Err(StudioError::format(recorded, "it holds no subject: */subject.toml is missing"));
     }
     Ok(subjects)
 }

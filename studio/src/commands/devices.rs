@@ -1,4 +1,4 @@
-//! `toile devices`: what is plugged in, at which speed, and what is wrong with it.
+//! `toile devices`: the cameras that are plugged in, their speed, and their problems.
 
 use std::{
     collections::BTreeSet,
@@ -18,6 +18,7 @@ use toile_driver_transport::{
 };
 use toile_driver_uvc_depth::nodes::{self, DepthNode};
 use toile_driver_webcam as webcam;
+use toile_live::{DeviceError, LiveError};
 
 use crate::{StudioError, outcome::Answer, session::Session};
 
@@ -29,7 +30,7 @@ Examples:
   toile devices
   sudo toile devices --install-udev-rules";
 
-/// List which cameras are plugged in, at which speed, and what is wrong with them
+/// List the cameras that are plugged in, their speed, and their problems
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Devices {
@@ -52,7 +53,7 @@ fn install() -> Result<Answer, StudioError> {
     let nodes = KernelVideo::default().list().unwrap_or_default();
     let vendors: Vec<u16> = nodes.into_iter().filter_map(|node| Some(node.usb?.id.0)).collect();
     let path =
-        udev::install(Path::new(udev::RULES_FOLDER), &vendors).map_err(|e| StudioError::Device(e.to_string()))?;
+        udev::install(Path::new(udev::RULES_FOLDER), &vendors).map_err(|e| LiveError::from(DeviceError::from(e)))?;
     let text = format!(
         "{}\nRun `udevadm control --reload` (as root), then plug the cameras in again.\n",
         printable_path(&path)
@@ -65,18 +66,18 @@ fn list() -> Answer {
     let mut answer = Answer::default();
     let usb = usb::list().unwrap_or_else(|e| warn(&mut answer, &e));
     let webcams = webcam::list().unwrap_or_else(|e| warn(&mut answer, &e));
-    tell(answer, &usb, webcams, &KernelVideo::default())
+    list_all(answer, &usb, webcams, &KernelVideo::default())
 }
 
 /// Lists every camera once, as what `toile capture` drives it as.
-fn tell(mut answer: Answer, usb: &[UsbCamera], webcams: Vec<(u32, String)>, video: &dyn Video) -> Answer {
+fn list_all(mut answer: Answer, usb: &[UsbCamera], webcams: Vec<(u32, String)>, video: &dyn Video) -> Answer {
     let cameras = realsense::list(video).unwrap_or_else(|e| warn(&mut answer, &e));
-    let mut told = nodes_told_already(video);
-    let nodes: Vec<DepthNode> = nodes::list(video).into_iter().filter(|n| !told.contains(&n.node)).collect();
-    told.extend(nodes.iter().map(|n| n.node.clone()));
-    let wide: Vec<WideNode> = stereo::nodes::list(video).into_iter().filter(|n| !told.contains(&n.node)).collect();
-    told.extend(wide.iter().map(|n| n.node.clone()));
-    let is_new = |(index, _): &(u32, String)| !told.contains(Path::new(&format!("/dev/video{index}")));
+    let mut listed = nodes_already_listed(video);
+    let nodes: Vec<DepthNode> = nodes::list(video).into_iter().filter(|n| !listed.contains(&n.node)).collect();
+    listed.extend(nodes.iter().map(|n| n.node.clone()));
+    let wide: Vec<WideNode> = stereo::nodes::list(video).into_iter().filter(|n| !listed.contains(&n.node)).collect();
+    listed.extend(wide.iter().map(|n| n.node.clone()));
+    let is_new = |(index, _): &(u32, String)| !listed.contains(Path::new(&format!("/dev/video{index}")));
     let webcams: Vec<(u32, String)> = webcams.into_iter().filter(is_new).collect();
     answer.text = text(usb, &cameras, &nodes, &wide, &webcams);
     let refused = refused(video);
@@ -99,7 +100,7 @@ fn tell(mut answer: Answer, usb: &[UsbCamera], webcams: Vec<(u32, String)>, vide
 
 /// Nodes of cameras that are listed with their USB device (also those that the kernel's own Kinect driver makes), and
 /// nodes without pictures.
-fn nodes_told_already(video: &dyn Video) -> BTreeSet<PathBuf> {
+fn nodes_already_listed(video: &dyn Video) -> BTreeSet<PathBuf> {
     let is_driven = |info: &NodeInfo| {
         let known = info.usb.as_ref().and_then(|usb| known::find(usb.id.0, usb.id.1));
         known.is_some_and(|known| known.family != Family::Orbbec)
@@ -111,7 +112,7 @@ fn nodes_told_already(video: &dyn Video) -> BTreeSet<PathBuf> {
 
 /// Nodes that may not be opened, with what to do; once for a camera.
 fn refused(video: &dyn Video) -> Vec<String> {
-    let mut told = BTreeSet::new();
+    let mut listed = BTreeSet::new();
     let nodes = video.list().unwrap_or_default().into_iter();
     let refused = nodes.filter_map(|info| match video.open(&info.node) {
         Err(error @ TransportError::NodePermission { .. }) => {
@@ -119,7 +120,7 @@ fn refused(video: &dyn Video) -> Vec<String> {
         }
         _ => None,
     });
-    refused.filter(|(address, _)| address.is_none() || told.insert(*address)).map(|(_, words)| words).collect()
+    refused.filter(|(address, _)| address.is_none() || listed.insert(*address)).map(|(_, words)| words).collect()
 }
 
 fn warn<T>(answer: &mut Answer, error: &dyn std::fmt::Display) -> Vec<T> {
@@ -127,13 +128,13 @@ fn warn<T>(answer: &mut Answer, error: &dyn std::fmt::Display) -> Vec<T> {
     Vec::new()
 }
 
-/// What a RealSense camera lacks.
+/// The missing parts of a RealSense camera.
 fn missing_nodes(camera: &realsense::Camera) -> Option<String> {
     let no_color = camera.color.is_none() && camera.has_color_part();
     let parts = [("depth", camera.depth.is_none()), ("infrared", camera.infrared.is_none()), ("colour", no_color)];
     let missing: Vec<&str> = parts.into_iter().filter(|(_, is_missing)| *is_missing).map(|(name, _)| name).collect();
     let missing = (!missing.is_empty()).then(|| missing.join(" and "))?;
-    Some(format!("{}: no video node for {missing}: unplug it and plug it in again", camera.name))
+    Some(format!("{}: the video node for {missing} is missing: unplug it and plug it in again", camera.name))
 }
 
 fn text(
@@ -196,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn every_camera_is_told_once_as_what_it_is() {
+    fn every_camera_is_listed_once_by_its_kind() {
         let bus = SimulatedBus::default();
         let d435 = bus.plug(Arc::new(Mutex::new(d435::model(d435::Pattern::default(), Wire::Bulk))));
         bus.plug(Arc::new(Mutex::new(side_by_side::model(Dark, Wire::Bulk))));
@@ -210,7 +211,7 @@ mod tests {
         };
         // The system calls every node a webcam; a laptop's own is on no known device.
         let webcams = (0..9).map(|index| (index, format!("Node {index}"))).collect();
-        let answer = tell(Answer::default(), &[usb], webcams, &SimulatedVideo::new(bus));
+        let answer = list_all(Answer::default(), &[usb], webcams, &SimulatedVideo::new(bus));
         let lines: Vec<&str> = answer.text.lines().collect();
         let depth = "usb 001:001  RealSense D435 827313080543 (High speed): \
                      depth /dev/video0, infrared /dev/video2, colour /dev/video4";
@@ -223,13 +224,13 @@ mod tests {
 
     #[test]
     fn nothing_and_a_camera_that_lacks_a_node_are_said() {
-        let nothing = tell(Answer::default(), &[], Vec::new(), &SimulatedVideo::new(SimulatedBus::default()));
+        let nothing = list_all(Answer::default(), &[], Vec::new(), &SimulatedVideo::new(SimulatedBus::default()));
         assert_eq!(nothing.text, "No camera is plugged in.\n");
         let bus = SimulatedBus::default();
         bus.plug(Arc::new(Mutex::new(d435::d405(d435::Pattern::default(), Wire::Bulk))));
         let mut camera = realsense::list(&SimulatedVideo::new(bus)).unwrap().remove(0);
         assert_eq!(missing_nodes(&camera), None);
         camera.depth = None;
-        assert!(missing_nodes(&camera).unwrap().contains("no video node for depth"));
+        assert!(missing_nodes(&camera).unwrap().contains("the video node for depth is missing"));
     }
 }

@@ -24,13 +24,13 @@ use crate::{
 
 const AFTER: &str = "\
 A subject's avatar.glb (pose of the first scan, with the motion as a clip) and avatar.vrm (T-pose) are written into its
-folder; what is missing before is run. A recording can be converted so that other viewers of MCAP show its depth.
+folder; missing steps before it are run. A recording can be converted so that other viewers of MCAP show its depth.
 
 With --cull-hidden both files lack what no one can see under closed cloth: body and lower layers end --cull-margin
 inside of each hem, collar and cuff. Head, hands and feet stay, and what only loose or open cloth covers. The files are
 smaller, and nothing can poke through where nothing is; export again without it for whole layers.
 
-Motion, joint names and what is left out are remembered in SUBJECT/edits/: later runs make the same avatar.
+Motion, joint names and hidden triangles that are left out are remembered in SUBJECT/edits/: later runs make the same avatar.
 
 Examples:
   toile export anna --motion dance.bvh
@@ -48,7 +48,7 @@ pub struct Export {
     /// BVH motion for the avatar, or `walk` for the one that ships with Toile (without: as the avatar was made last)
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
-    /// What the joints are called in avatar.glb: as VRM names its bones, by H-Anim, or as Mixamo does, which other
+    /// The names of the joints in avatar.glb: as VRM names its bones, by H-Anim, or as Mixamo does, which other
     /// programs map by themselves (without: as the avatar was made last; vrm the first time)
     #[arg(long, value_enum)]
     joint_names: Option<Names>,
@@ -134,10 +134,10 @@ impl Export {
 /// A line for each layer that something was left out of.
 fn left_out(results: &Value) -> String {
     let layers = results["stages"]["avatar/export"]["left_out"].as_object();
-    let line = |(layer, told): (&String, &Value)| {
-        format!("{layer}: {} of {} triangles left out\n", told["triangles"], told["of"])
+    let line = |(layer, reported): (&String, &Value)| {
+        format!("{layer}: {} of {} triangles left out\n", reported["triangles"], reported["of"])
     };
-    layers.into_iter().flatten().filter(|(_, told)| told["triangles"] != 0).map(line).collect()
+    layers.into_iter().flatten().filter(|(_, reported)| reported["triangles"] != 0).map(line).collect()
 }
 
 fn convert(recording: &Path, plain: &Path) -> Result<Answer, StudioError> {

@@ -11,7 +11,7 @@ use crate::{
 };
 
 const AFTER: &str = "\
-Runs what is missing before it: fusing, the body, the poses.
+Runs the missing steps before it: fusing, the body, the poses.
 
 Examples:
   toile extract anna

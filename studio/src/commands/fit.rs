@@ -51,7 +51,7 @@ pub struct Person {
     /// The person in the scan is dressed: the body under the clothes is estimated
     #[arg(long, requires = "scan")]
     pub dressed: bool,
-    /// What is said by hand: landmarks on the scan, shape components, joints: JSON, as in docs/edits.md
+    /// Statements by hand: landmarks on the scan, shape components, joints: JSON, as in docs/edits.md
     #[arg(long, value_name = "FILE", requires = "scan", alias = "landmarks")]
     pub edits: Option<PathBuf>,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml

@@ -136,7 +136,7 @@ impl Fuse {
 fn known_poses(path: &Path) -> Result<Vec<KnownPose>, StudioError> {
     let poses = trajectory::read(path)?;
     if poses.is_empty() {
-        return Err(CaptureError::format(path, "holds no pose; a line is `t tx ty tz qx qy qz qw`").into());
+        return Err(CaptureError::format(path, "does not hold a pose; a line is `t tx ty tz qx qy qz qw`").into());
     }
     Ok(poses.iter().map(|p| KnownPose { device_time_ns: p.time_ns, scan_from_camera: p.pose }).collect())
 }

@@ -32,13 +32,13 @@ pub struct Import {
     /// The subject's folder
     #[arg(long, value_name = "DIR")]
     subject: PathBuf,
-    /// What the take adds, without a number: body, trousers, shirt, ...
+    /// The addition of the take, without a number: body, trousers, shirt, ...
     #[arg(long, value_name = "NAME")]
     layer: String,
     /// Layout of the folder (guessed when not said)
     #[arg(long, value_name = "F")]
     format: Option<Format>,
-    /// What garment it is: top, trousers, skirt, dress, jacket, other
+    /// The type of the garment: top, trousers, skirt, dress, jacket, other
     #[arg(long = "type", value_name = "TYPE")]
     garment: Option<GarmentType>,
     /// Replace the layer's take; the old one is kept under takes/rejected/

@@ -1,4 +1,4 @@
-//! `toile inspect`: what is in a recording, a folder or a subject, and whether it is healthy.
+//! `toile inspect`: the contents of a recording, a folder or a subject, and whether it is healthy.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ Examples:
   toile inspect anna
   toile inspect anna/takes/00-body.mcap --json";
 
-/// Show what is in a recording, a folder or a subject, and whether it is healthy
+/// Show the contents of a recording, a folder or a subject, and whether it is healthy
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Inspect {

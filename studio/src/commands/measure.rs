@@ -37,7 +37,7 @@ impl Measure {
     }
 }
 
-/// What a fit said, with the table that it wrote into `folder`.
+/// The answer of a fit, with the table that it wrote into `folder`.
 fn measured(fitted: Answer, folder: &Path) -> Result<Answer, StudioError> {
     let table: MeasureTable = read(&folder.join("measurements.json"))?;
     let width = table.measures.iter().map(|m| m.name.len()).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! The commands, a file each: what it takes, what it calls, what it answers.
+//! The commands, a file each: its options, its calls, its answer.
 
 pub mod capture;
 pub mod completions;

@@ -1,8 +1,8 @@
-//! `--prior`: what is assumed about the motion between frames.
+//! `--prior`: the assumption about the motion between frames.
 
 use toile_fusion::Prior;
 
-/// What is assumed about the motion between frames.
+/// The assumption about the motion between frames.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 pub enum PriorChoice {
     /// The person turns evenly before a resting camera.

@@ -1,4 +1,4 @@
-//! What commands share: taking a subject to a goal, and looking at paths.
+//! Shared by commands: taking a subject to a goal, and looking at paths.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ pub(super) fn reach(subject: &Path, goal: Goal, options: &Options, session: &Ses
     answer(summary, text)
 }
 
-/// What a summary is to people and machines.
+/// The answer to people and machines, from a summary.
 fn answer(summary: Summary, text: String) -> Result<Answer, StudioError> {
     let Summary { layers, measurements, files, decided, remarks, notes } = summary;
     let files: Vec<String> = files.iter().map(|f| printable_path(f)).collect();
@@ -40,7 +40,7 @@ pub(super) fn is_subject(path: &Path) -> bool {
 pub(super) fn motion_choice(motion: Option<&Path>) -> MotionChoice {
     match motion {
         None => MotionChoice::AsBefore,
-        // A file of that name without an extension is no motion that anybody writes.
+        // A file of that name without an extension is not a motion that anybody writes.
         Some(path) if path == Path::new("walk") => MotionChoice::Walk,
         Some(path) => MotionChoice::File(path.to_path_buf()),
     }

@@ -37,7 +37,7 @@ pub struct Synthesize {
     /// Everything random follows from it
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// What the takes add, inside to outside (at most five; `--garments ""` for the body alone)
+    /// The garments that the takes add, inside to outside (at most five; `--garments ""` for the body alone)
     #[arg(long, value_delimiter = ',', default_value = "trousers,tshirt", value_name = "KINDS")]
     garments: Vec<String>,
     /// Around which mean the person is drawn
@@ -61,7 +61,7 @@ pub struct Synthesize {
     /// How far the chest moves with the breath, millimetres
     #[arg(long, default_value_t = 0.0)]
     breathing: f64,
-    /// Camera to axis, metres (default: what suits the camera)
+    /// Camera to axis, metres (default: the distance that suits the camera)
     #[arg(long)]
     distance: Option<f64>,
     /// Depth as the geometry is, without the sensor's noise

@@ -1,4 +1,4 @@
-//! What the black-box tests share.
+//! Shared by the black-box tests.
 
 #![allow(dead_code, clippy::unwrap_used)] // each test file uses its own part; all of it is test code
 

@@ -1,4 +1,4 @@
-//! What tests need from outside the project: data that may not be given away, and other people's programs.
+//! Requirements of tests from outside the project: data that may not be given away, and other people's programs.
 //!
 //! Where it is missing a test passes, after it has said so on standard error; with `TOILE_REQUIRE_OUTSIDE=1`, which
 //! continuous integration sets where everything is at hand, it fails instead. So a test can never turn green on a machine
@@ -46,6 +46,14 @@ pub fn program(name: &str) -> Option<PathBuf> {
 /// As [`data`].
 pub fn file(path: &Path) -> Option<PathBuf> {
     found(path.exists(), &path.display().to_string()).then(|| path.to_path_buf())
+}
+
+/// Something else that a machine may lack, such as a running service: true where `is_there` holds.
+///
+/// # Panics
+/// As [`data`].
+pub fn capability(is_there: bool, what: &str) -> bool {
+    found(is_there, what)
 }
 
 /// True where it is there; says or fails where it is not.

@@ -12,7 +12,7 @@ use serde_json::Value;
 pub struct Member {
     /// Its folder, relative to the top.
     pub folder: String,
-    /// The packages that it is built with.
+    /// The packages that it is built with, those of its build script included.
     pub imports: Vec<String>,
     /// The packages that only its tests, benches and examples use.
     pub tests_with: Vec<String>,
@@ -43,11 +43,12 @@ fn metadata() -> Value {
 fn member(package: &Value) -> Member {
     let manifest = Path::new(package["manifest_path"].as_str().unwrap());
     let folder = manifest.parent().unwrap().strip_prefix(top()).unwrap().display().to_string();
-    let of_kind = |wanted: Option<&str>| {
+    let of_kind = |wanted: Option<&str>| -> Vec<String> {
         let all = package["dependencies"].as_array().unwrap().iter();
         all.filter(|d| d["kind"].as_str() == wanted).map(|d| d["name"].as_str().unwrap().to_string()).collect()
     };
-    Member { folder, imports: of_kind(None), tests_with: of_kind(Some("dev")) }
+    let imports = [of_kind(None), of_kind(Some("build"))].concat();
+    Member { folder, imports, tests_with: of_kind(Some("dev")) }
 }
 
 /// Every Rust file below `folder`, with its text.

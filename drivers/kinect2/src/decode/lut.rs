@@ -10,7 +10,7 @@ use super::{COLUMNS, Row};
 /// Bytes of a row, and of a quarter of it.
 pub const ROW_BYTES: usize = COLUMNS * 11 / 8;
 const QUARTER_BYTES: usize = ROW_BYTES / 4;
-/// What a measurement beyond the sensor's range is stated as: a negative zero.
+/// The value of a measurement beyond the sensor's range: a negative zero.
 pub const SATURATED: i16 = i16::MAX;
 
 /// The measurement of every eleven bits.

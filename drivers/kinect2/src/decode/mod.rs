@@ -47,7 +47,7 @@ const PARALLAX: f64 = 90.0;
 const INFRARED_GAIN: f32 = 16.0 / 3.0;
 const MAX_INFRARED: f32 = 65_535.0;
 
-/// What is dropped.
+/// The depth that is dropped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecodeSettings {
     /// Depth below this is dropped, metres. Default 0.5, as libfreenect2 and the vendor do.
@@ -66,7 +66,7 @@ impl Default for DecodeSettings {
     }
 }
 
-/// What a packet shows, row by row, not mirrored.
+/// The image of a packet, row by row, not mirrored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decoded {
     /// Depth along +Z, millimetres; 0 where there is none.
@@ -82,7 +82,7 @@ pub struct Decoder {
     rings: Box<Rings>,
 }
 
-/// What is computed once from the calibration.
+/// Tables that are computed once from the calibration.
 struct Tables {
     lut: [i16; 2048],
     /// Cosine and sine of P0, times the frequency's gain.

@@ -13,7 +13,7 @@ use super::{
     phasor::LIGHT_PER_LENGTH,
 };
 
-/// Least light of one frequency, and of all three together.
+/// Minimum light of one frequency, and of all three together.
 const MIN_LIGHT: f32 = 3.0;
 const MIN_SUM: f32 = 10.0;
 /// The more light, the better the three must fit: at most e^(a + b · ln light) apart, between two bounds
@@ -24,7 +24,7 @@ const MISFIT: [f32; 2] = [0.349_065_9, 0.610_865_3];
 /// Direction in which the three answers lie when they agree: (80, 16, 120) MHz of length one.
 const AGREE: [f32; 3] = [0.551_318, 0.110_264, 0.826_977];
 
-/// What a row's phasors say.
+/// The distances of a row's phasors.
 pub struct Distances<'a> {
     /// Distance along the ray in units of 2083.333 mm; 0 where there is none.
     pub range: &'a mut Row<f32>,

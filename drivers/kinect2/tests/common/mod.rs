@@ -17,7 +17,7 @@ use toile_driver_transport::{DeviceInfo, simulated::SimulatedBus};
 /// One pattern for all tests, computed once.
 pub static PATTERN: LazyLock<Pattern> = LazyLock::new(Pattern::default);
 
-/// What each frame of the pattern must give: millimetres, and the decoded (mirrored) colours.
+/// The expected content of each frame of the pattern: millimetres, and the decoded (mirrored) colours.
 type Truth = (Vec<u16>, Vec<[u8; 3]>);
 static TRUTH: LazyLock<Mutex<BTreeMap<u64, Arc<Truth>>>> = LazyLock::new(Mutex::default);
 
@@ -52,7 +52,7 @@ pub fn color_fault(frame: u64, packet: usize, what: StreamFault) -> Fault {
     Fault { stream: Stream::Color, frame, packet, what }
 }
 
-/// What frame `number` must give.
+/// The expected content of frame `number`.
 fn truth(number: u64) -> Arc<Truth> {
     let number = number % Pattern::FRAMES;
     let mut all = TRUTH.lock().unwrap();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use toile_driver_kinect2::Calibration;
 use toile_driver_simulated::kinect2::{
     Content, Optics, Pattern, Rendered,
-    phases::{self, Seen},
+    phases::{self, Lit},
 };
 use toile_synthetic::{Subject, SyntheticSettings, sensor::SensorPreset};
 
@@ -50,9 +50,9 @@ fn waves() -> (Optics, Arc<Vec<u8>>) {
         let (u, v) = (i % COLUMNS, i / COLUMNS);
         let seen = Pattern::seen(3, u, v);
         let blinding = (330..350).contains(&u) && (150..170).contains(&v);
-        Seen { light: if blinding { 25_000.0 } else { seen.light }, ..seen }
+        Lit { light: if blinding { 25_000.0 } else { seen.light }, ..seen }
     };
-    let seen: Vec<Seen> = (0..COLUMNS * ROWS).map(seen).collect();
+    let seen: Vec<Lit> = (0..COLUMNS * ROWS).map(seen).collect();
     let noise = |i: usize, k: usize| NOISE * 1.7 * (((i * 9 + k) as f64 * 12.9898).sin() * 43_758.545_3).fract();
     (optics, Arc::new(phases::packet(&optics, &seen, noise)))
 }

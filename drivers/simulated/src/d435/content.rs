@@ -1,4 +1,4 @@
-//! What the modelled camera sees.
+//! The scene before the modelled camera.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ pub trait Content: Send {
     fn yuyv(&mut self, frame: u64, size: (u16, u16)) -> Vec<u8>;
     /// Left and right infrared.
     fn infrared(&mut self, frame: u64, size: (u16, u16)) -> Vec<[u8; 2]>;
-    /// What the camera is calibrated to.
+    /// The calibration of the camera.
     fn optics(&self) -> Optics {
         Optics::default()
     }
@@ -23,7 +23,7 @@ pub trait Content: Send {
 /// Made-up images, another one each frame; every pixel differs from its neighbours.
 #[derive(Debug, Clone, Default)]
 pub struct Pattern {
-    /// What the camera is calibrated to.
+    /// The calibration of the camera.
     pub optics: Optics,
 }
 

@@ -44,7 +44,7 @@ pub enum MonitorFault {
 /// The extension unit's state.
 pub struct Monitor {
     pub(super) optics: Optics,
-    /// What is wrong with it.
+    /// The problem.
     pub fault: Option<MonitorFault>,
     serial: [u8; 6],
     answer: Vec<u8>,

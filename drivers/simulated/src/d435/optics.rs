@@ -1,4 +1,4 @@
-//! What the modelled camera is calibrated to, and the tables that say so.
+//! The calibration of the modelled camera, and the tables that state it.
 //!
 //! Layout of the tables: `d400_coefficients_table` and `d400_rgb_calibration_table` of librealsense
 //! `src/ds/d400/d400-private.h`, each behind `table_header` of `src/ds/ds-private.h`.

@@ -20,7 +20,7 @@ const EXTENSION: [u8; 16] =
 const SIZES: [(u16, u16); 4] = [(640, 480), (848, 480), (1280, 720), (424, 240)];
 const RATES: [u32; 3] = [30, 15, 6];
 
-/// What the camera sees and what its units answer.
+/// The scene before the camera, and the answers of its units.
 pub struct D435 {
     content: Box<dyn Content>,
     /// The extension unit.
@@ -71,7 +71,7 @@ impl D435 {
         Self { content: Box::new(content), monitor }
     }
 
-    /// What it sees.
+    /// The scene.
     pub fn content(&mut self) -> &mut dyn Content {
         &mut *self.content
     }

@@ -85,7 +85,7 @@ impl SimulatedCamera {
         &mut *self.content
     }
 
-    /// What its descriptors say (`lsusb -v` of a model 1414).
+    /// The content of its descriptors (`lsusb -v` of a model 1414).
     pub fn descriptors(&self) -> Descriptors {
         let endpoint = |address| Endpoint { address, attributes: 1, packet_size: 0x0bc0, interval: 1 };
         Descriptors {

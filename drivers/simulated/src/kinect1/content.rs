@@ -1,4 +1,4 @@
-//! What the modelled camera sees.
+//! The scene before the modelled camera.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ pub trait Content: Send {
     fn bayer(&mut self, frame: u64) -> Vec<u8>;
     /// Infrared of [`INFRARED_SIZE`], ten bits.
     fn infrared(&mut self, frame: u64) -> Vec<u16>;
-    /// What the camera is calibrated to.
+    /// The calibration of the camera.
     fn optics(&self) -> Optics {
         Optics::default()
     }
@@ -24,7 +24,7 @@ pub trait Content: Send {
 /// Made-up images, another one each frame; every pixel differs from its neighbours.
 #[derive(Debug, Clone, Default)]
 pub struct Pattern {
-    /// What the camera is calibrated to.
+    /// The calibration of the camera.
     pub optics: Optics,
 }
 
@@ -96,7 +96,7 @@ impl Content for Repeated {
 pub struct RenderedFrame {
     /// Distance along +Z that the sensor measures, millimetres; 0 where there is none.
     pub depth_mm: Vec<u16>,
-    /// What the colour camera sees.
+    /// The colour camera's picture.
     pub color: Vec<[u8; 3]>,
 }
 

@@ -22,7 +22,7 @@ pub struct SimulatedMotor {
 }
 
 impl SimulatedMotor {
-    /// What its descriptors say.
+    /// The content of its descriptors.
     pub fn descriptors(&self) -> Descriptors {
         let strings = ["Microsoft", "Xbox NUI Motor", ""].map(String::from);
         Descriptors { ids: [0x045e, 0x02b0, 0x0105], strings, endpoints: Vec::new() }

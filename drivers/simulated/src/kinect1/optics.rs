@@ -1,4 +1,4 @@
-//! What the modelled camera is calibrated to: as truth in metres, and as the numbers that the camera states.
+//! The calibration of the modelled camera: as truth in metres, and as the numbers that the camera states.
 //!
 //! The stated numbers are libfreenect's (`src/registration.c`): depth is z = 10·r·e / (e − m) millimetres with the zero
 //! plane's distance r (mm / 10), the emitter's distance e (cm) and m = ((raw / 4 − c) − 0.375)·p. A registered column

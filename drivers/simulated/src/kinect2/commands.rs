@@ -36,9 +36,9 @@ impl Commands {
         let data = match (code, parameter) {
             (0x02, _) => firmware(),
             (0x22, 1) => serial.bytes().flat_map(|b| [b, 0]).chain([0; 2]).collect(),
-            (0x22, 2) => Optics::told_p0(),
-            (0x22, 3) => optics.told_depth(),
-            (0x22, 4) => optics.told_color(),
+            (0x22, 2) => Optics::stated_p0(),
+            (0x22, 3) => optics.stated_depth(),
+            (0x22, 4) => optics.stated_color(),
             (0x16, _) => self.status(),
             (0x2b, on) => {
                 self.streaming = on == 1;

@@ -1,4 +1,4 @@
-//! What the modelled camera sees.
+//! The scene before the modelled camera.
 
 use std::{
     collections::BTreeMap,
@@ -9,7 +9,7 @@ use toile_synthetic::{Take, sensor::TrueImage};
 
 use super::{
     COLOR_SIZE, Optics, SIZE,
-    phases::{self, Seen},
+    phases::{self, Lit},
 };
 
 /// The source of a modelled camera's images.
@@ -18,7 +18,7 @@ pub trait Content: Send {
     fn depth(&mut self, frame: u64) -> Arc<Vec<u8>>;
     /// Colour of frame `frame`, a mirrored JPEG.
     fn jpeg(&mut self, frame: u64) -> Arc<Vec<u8>>;
-    /// What the camera is calibrated to.
+    /// The calibration of the camera.
     fn optics(&self) -> Optics;
 }
 
@@ -33,7 +33,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// So many frames differ.
+    /// Number of frames that differ.
     pub const FRAMES: u64 = 5;
 
     /// Before another camera.
@@ -41,15 +41,15 @@ impl Pattern {
         Self { optics, ..Self::default() }
     }
 
-    /// What depth pixel (`u`, `v`) sees in frame `frame`: waves with steps in them, dark and far places.
-    pub fn seen(frame: u64, u: usize, v: usize) -> Seen {
+    /// The scene at depth pixel (`u`, `v`) in frame `frame`: waves with steps in them, dark and far places.
+    pub fn seen(frame: u64, u: usize, v: usize) -> Lit {
         let (x, y, t) = (u as f64, v as f64, (frame % Self::FRAMES) as f64);
         let wave = 1.8 + 0.4 * (x / 61.0 + t).sin() + 0.3 * (y / 43.0).cos();
         let step = if (u / 64 + v / 53).is_multiple_of(2) { 0.0 } else { 0.9 };
         let far = if u > 440 && v < 120 { 3.0 } else { 0.0 };
         let dark = if (200..230).contains(&u) && v > 300 { 0.0 } else { 1.0 };
         let z = wave + step + far;
-        Seen { z, light: dark * (600.0 + 300.0 * (x / 17.0).sin() * (y / 23.0).cos()) / z }
+        Lit { z, light: dark * (600.0 + 300.0 * (x / 17.0).sin() * (y / 23.0).cos()) / z }
     }
 
     /// Colour at a place that is not mirrored: red grows along the columns, green along the rows.
@@ -63,7 +63,7 @@ impl Pattern {
         frames
             .entry(frame)
             .or_insert_with(|| {
-                let seen: Vec<Seen> = (0..SIZE.0 * SIZE.1).map(|i| Self::seen(frame, i % SIZE.0, i / SIZE.0)).collect();
+                let seen: Vec<Lit> = (0..SIZE.0 * SIZE.1).map(|i| Self::seen(frame, i % SIZE.0, i / SIZE.0)).collect();
                 let color = |i: usize| Self::color(frame, i % COLOR_SIZE.0, i / COLOR_SIZE.0);
                 let pixels: Vec<[u8; 3]> = (0..COLOR_SIZE.0 * COLOR_SIZE.1).map(color).collect();
                 (Arc::new(phases::packet(&self.optics, &seen, |_, _| 0.0)), Arc::new(mirrored_jpeg(pixels)))
@@ -148,7 +148,7 @@ impl Content for Rendered {
 }
 
 /// Light falls with the square of the distance, with the slope of the surface, and with its darkness.
-fn seen(truth: &TrueImage) -> Vec<Seen> {
+fn seen(truth: &TrueImage) -> Vec<Lit> {
     /// Light of a white surface that faces the camera at one metre.
     const LIGHT: f64 = 7000.0;
     let pixels = truth.depth.iter().zip(&truth.cosine).zip(&truth.albedo);
@@ -156,7 +156,7 @@ fn seen(truth: &TrueImage) -> Vec<Seen> {
         .map(|((&z, &cosine), &albedo)| {
             let z = f64::from(z);
             let light = if z > 0.0 { LIGHT * f64::from(cosine) * f64::from(albedo) / (z * z) } else { 0.0 };
-            Seen { z, light }
+            Lit { z, light }
         })
         .collect()
 }

@@ -1,4 +1,4 @@
-//! What a kernel asks a USB 3 device with two interfaces (USB 3.2 §9.6); the interfaces and endpoints are those of
+//! Answers to a kernel that asks a USB 3 device with two interfaces (USB 3.2 §9.6); the interfaces and endpoints are those of
 //! libfreenect2's `protocol/usb_control.h`.
 
 use toile_driver_transport::{Setup, simulated::Answer};

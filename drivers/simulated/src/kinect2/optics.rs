@@ -1,4 +1,4 @@
-//! What the modelled camera is calibrated to: as truth in metres, and as the numbers that the camera states.
+//! The calibration of the modelled camera: as truth in metres, and as the numbers that the camera states.
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use toile_geometry::{Rigid, camera::PinholeCamera};
@@ -68,11 +68,11 @@ impl Optics {
 
     /// The answers with the depth camera's numbers, the colour camera's, and the tables P0.
     pub fn answers(&self) -> [Vec<u8>; 3] {
-        [self.told_depth(), self.told_color(), Self::told_p0()]
+        [self.stated_depth(), self.stated_color(), Self::stated_p0()]
     }
 
     /// The answer with the depth camera's numbers.
-    pub(super) fn told_depth(&self) -> Vec<u8> {
+    pub(super) fn stated_depth(&self) -> Vec<u8> {
         let lens = &self.depth;
         let [k1, k2, p1, p2, k3] = lens.distortion;
         // Mirrored, pixel centres at halves.
@@ -83,7 +83,7 @@ impl Optics {
     }
 
     /// The answer with the colour camera's numbers and the way from depth to it.
-    pub(super) fn told_color(&self) -> Vec<u8> {
+    pub(super) fn stated_color(&self) -> Vec<u8> {
         let (depth, color, shift_m) = (&self.depth, &self.color, 1000.0 * self.baseline);
         let (sin, cos) = self.roll.sin_cos();
         let unit = COLOR_UNIT * color.fx;
@@ -107,7 +107,7 @@ impl Optics {
     }
 
     /// The answer with the tables P0.
-    pub(super) fn told_p0() -> Vec<u8> {
+    pub(super) fn stated_p0() -> Vec<u8> {
         let pixels = SIZE.0 * SIZE.1;
         let mut stated = Vec::with_capacity(IMAGE_BYTES * 5);
         stated.extend([32, 0, 0, 2 * pixels as u32, 0, 0, 0, 0].iter().flat_map(|w: &u32| w.to_le_bytes()));

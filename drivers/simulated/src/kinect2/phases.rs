@@ -16,11 +16,11 @@ const UNIT_MM: f64 = 6250.0 / 3.0;
 /// Strength of the parallax between light and lens.
 const PARALLAX: f64 = 90.0;
 /// Beyond this a measurement is saturated.
-const MOST: f64 = 16_352.0;
+const MAX_MEASUREMENT: f64 = 16_352.0;
 
-/// What one pixel sees.
+/// The depth and the light of one pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Seen {
+pub struct Lit {
     /// Depth along +Z, metres; 0: nothing, no light comes back.
     pub z: f64,
     /// Light that comes back.
@@ -28,7 +28,7 @@ pub struct Seen {
 }
 
 /// A depth packet: ten images, mirrored as the sensor sees. `noise` gives what is added to measurement k (0..9) of pixel i.
-pub fn packet(optics: &Optics, seen: &[Seen], noise: impl Fn(usize, usize) -> f64) -> Vec<u8> {
+pub fn packet(optics: &Optics, seen: &[Lit], noise: impl Fn(usize, usize) -> f64) -> Vec<u8> {
     let phasors = phasors(optics, seen);
     let mut bytes = vec![0; 10 * IMAGE_BYTES];
     for (image, out) in bytes.chunks_exact_mut(IMAGE_BYTES).take(9).enumerate() {
@@ -46,7 +46,7 @@ pub fn packet(optics: &Optics, seen: &[Seen], noise: impl Fn(usize, usize) -> f6
 }
 
 /// Per pixel and frequency the light with its delay, blurred a little by the lens, so that edges mix both sides.
-fn phasors(optics: &Optics, seen: &[Seen]) -> Vec<[[f64; 2]; 3]> {
+fn phasors(optics: &Optics, seen: &[Lit]) -> Vec<[[f64; 2]; 3]> {
     let rays = optics.depth.rays();
     let sharp: Vec<[[f64; 2]; 3]> = seen
         .iter()
@@ -95,7 +95,7 @@ fn packet_row(v: usize) -> usize {
 /// Eleven bits: a sign, three bits of exponent, seven of mantissa.
 fn code(measured: f64) -> u16 {
     let size = measured.abs();
-    if size > MOST {
+    if size > MAX_MEASUREMENT {
         return 1024;
     }
     let step = (0..7).find(|step| size / f64::from(1 << step) < 255.5).unwrap_or(6);

@@ -18,12 +18,12 @@ const MICROFRAMES: u64 = 8000;
 /// A stream of bulk pictures may be this many pictures before another one.
 const MAX_AHEAD: u64 = 1;
 
-/// What a camera sees, and what its units answer.
+/// The scene before a camera, and the answers of its units.
 pub trait Scene: Send {
     /// The bytes of a picture.
     fn picture(&mut self, picture: Picture) -> Vec<u8>;
 
-    /// What the header of a picture's first payload has behind the standard part.
+    /// The part of the header of a picture's first payload behind the standard one.
     fn extra_header(&mut self, picture: Picture) -> Vec<u8> {
         let _ = picture;
         Vec::new()

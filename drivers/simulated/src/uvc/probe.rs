@@ -10,7 +10,7 @@ pub(super) const BYTES: usize = 34;
 /// The longest header of a bulk payload.
 const MAX_HEADER: u32 = 255;
 
-/// What a stream was asked for, or agreed to.
+/// The settings that a stream was asked for, or agreed to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Agreed {
     /// Positions of the format and the size.
@@ -20,7 +20,7 @@ pub(super) struct Agreed {
 }
 
 impl Agreed {
-    /// What is offered when nothing was asked for.
+    /// The offer when nothing was asked for.
     pub(super) fn first(stream: &StreamShape) -> Self {
         let fps = stream.formats.first().and_then(|f| f.rates.first().copied()).unwrap_or(30);
         Self { format: 0, size: 0, fps }

@@ -15,7 +15,7 @@ pub(super) struct Sending {
     pub(super) number: u64,
     /// Time of the camera's clock, microseconds.
     pub(super) time: u32,
-    /// What the first payload's header has behind the standard part.
+    /// The part of the first payload's header behind the standard one.
     pub(super) extra: Vec<u8>,
     /// The picture; of a bulk stream the whole payload.
     pub(super) bytes: Vec<u8>,

@@ -38,7 +38,7 @@ pub fn hit(origin: Point3<f64>, direction: Vector3<f64>) -> Point3<f64> {
     origin + direction * ((offset - normal.dot(&origin.coords)) / normal.dot(&direction))
 }
 
-/// What both cameras see; drawn once.
+/// The scene before both cameras; drawn once.
 pub fn pictures() -> (Arc<RgbImage>, Arc<RgbImage>) {
     static PICTURES: OnceLock<(Arc<RgbImage>, Arc<RgbImage>)> = OnceLock::new();
     let draw = || {

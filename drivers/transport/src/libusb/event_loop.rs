@@ -65,11 +65,11 @@ mod tests {
     #[test]
     fn a_hundred_loops_start_and_end() {
         for _ in 0..100 {
-            let Ok(context) = Context::new() else {
-                eprintln!("skipped: libusb does not start here");
+            let context = Context::new();
+            if !toile_outside::capability(context.is_ok(), "a kernel on which libusb starts") {
                 return;
-            };
-            drop(EventLoop::start(context).unwrap());
+            }
+            drop(EventLoop::start(context.unwrap()).unwrap());
         }
     }
 }

@@ -53,7 +53,7 @@ impl Bus for LibusbBus {
     }
 }
 
-/// What the descriptors say; `None` where they cannot be read.
+/// The content of the descriptors; `None` where they cannot be read.
 pub(crate) fn info_of(device: &rusb::Device<rusb::Context>) -> Option<DeviceInfo> {
     let descriptor = device.device_descriptor().ok()?;
     let rusb::Version(major, minor, sub) = descriptor.device_version();

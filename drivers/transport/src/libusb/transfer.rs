@@ -31,10 +31,10 @@ use rusb::{
 use super::event_loop::EventLoop;
 use crate::{PacketStatus, Transfer, TransferKind, TransferStatus, usb::PacketResult};
 
-/// What Linux says where `usbcore.usbfs_memory_mb` is used up.
+/// The error of Linux where `usbcore.usbfs_memory_mb` is used up.
 const ENOMEM: i32 = 12;
 
-/// What transfers in flight keep alive: the handle first, then the thread that finishes them.
+/// Kept alive by transfers in flight: the handle first, then the thread that finishes them.
 pub(super) struct Shared {
     pub(super) handle: DeviceHandle<Context>,
     pub(super) flights: Flights,
@@ -63,7 +63,7 @@ struct Pointer(NonNull<libusb_transfer>);
 // SAFETY: *listed*: the pointer is only used under the lock of `Flights`, and libusb's calls are thread-safe.
 unsafe impl Send for Pointer {}
 
-/// What one transfer in flight owns.
+/// Owned by one transfer in flight.
 struct Flight {
     transfer: Transfer,
     shared: Arc<Shared>,

@@ -45,7 +45,7 @@ impl SimulatedBus {
         ports.plugged.retain(|p| p.info != *info);
     }
 
-    /// What is plugged in now.
+    /// The devices that are plugged in now.
     pub(super) fn plugged(&self) -> Vec<Plugged> {
         let mut ports = self.ports();
         // A device that unplugged itself is off the bus.

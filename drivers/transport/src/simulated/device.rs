@@ -1,8 +1,8 @@
-//! What a device made of code answers. The same device sits behind the in-process bus and behind USB/IP.
+//! The answers of a device made of code. The same device sits behind the in-process bus and behind USB/IP.
 
 use crate::{LinkSpeed, Setup};
 
-/// What a simulated device says of itself without being opened.
+/// Facts that a simulated device gives without being opened.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SimulatedInfo {
     /// USB vendor id.
@@ -19,7 +19,7 @@ pub struct SimulatedInfo {
     pub iso_endpoints: Vec<(u8, usize)>,
 }
 
-/// What comes of a request.
+/// The answer to a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Answer {
     /// Done; the data that goes to the host (empty for requests that only take).
@@ -32,7 +32,7 @@ pub enum Answer {
     Gone,
 }
 
-/// What comes of one isochronous packet.
+/// The answer to one isochronous packet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Packet {
     /// It came, perhaps empty. More than the endpoint's room is cut off, as a host controller does.
@@ -45,7 +45,7 @@ pub enum Packet {
 
 /// A device made of code.
 pub trait SimulatedDevice: Send {
-    /// What it is.
+    /// Its identity.
     fn info(&self) -> SimulatedInfo;
 
     /// A control request (class or vendor; standard ones too where it serves a kernel); `data` is what the

@@ -1,16 +1,16 @@
-//! What the nodes of one simulated video stream share: buffers that wait, and the picture that is being assembled.
+//! The state that the nodes of one simulated video stream share: buffers that wait, and the picture that is being assembled.
 
 use std::collections::VecDeque;
 
 use super::uvc::Assembler;
 use crate::video::VideoBuffer;
 
-/// What one bulk read asks for (`UVC_MAX_PACKETS` of 512 bytes).
+/// The size of one bulk read (`UVC_MAX_PACKETS` of 512 bytes).
 pub(super) const BULK_ROOM: usize = 16_384;
 /// More than any picture has.
 pub(super) const MAX_ROOM: usize = 1 << 26;
 
-/// What the nodes of one stream share.
+/// Shared by the nodes of one stream.
 #[derive(Default)]
 pub(crate) struct Flow {
     pub(super) assembler: Option<Assembler>,

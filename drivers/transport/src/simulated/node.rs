@@ -41,7 +41,7 @@ pub(super) struct SimulatedNode {
     stream: Streaming,
     is_metadata: bool,
     flow: Arc<Mutex<Flow>>,
-    /// What was asked for: format, size, frame index, interval.
+    /// The request: format, size, frame index, interval.
     asked: Option<Asked>,
     whole_headers: bool,
 }

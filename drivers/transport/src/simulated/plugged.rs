@@ -38,7 +38,7 @@ impl Plugged {
         self.clock.fetch_max(microframe, Ordering::AcqRel);
     }
 
-    /// What the nodes of a streaming interface share.
+    /// Shared by the nodes of a streaming interface.
     pub(super) fn flow(&self, interface: u8) -> Arc<Mutex<Flow>> {
         let mut flows = self.flows.lock().unwrap_or_else(PoisonError::into_inner);
         flows.entry(interface).or_default().clone()

@@ -5,9 +5,9 @@ use std::{mem, time::Duration};
 
 /// The streams of an open camera, as [`Streaming`] drives them.
 pub trait Streams {
-    /// What they give.
+    /// The frames that they give.
     type Frame;
-    /// What ends them.
+    /// The error that ends them.
     type Error;
 
     /// The next frame that is ready; an error costs that frame alone.
@@ -16,13 +16,13 @@ pub trait Streams {
     /// Takes what comes next, and returns in a bounded time where nothing comes.
     ///
     /// # Errors
-    /// What ends the streams, such as an unplug.
+    /// The error that ends the streams, such as an unplug.
     fn step(&mut self) -> Result<Progress, Self::Error>;
 
     /// Switches the streams off and on; frames of which a part came are given up.
     ///
     /// # Errors
-    /// What ends the streams.
+    /// The error that ends the streams.
     fn restart(&mut self) -> Result<(), Self::Error>;
 
     /// Nothing more comes: what waits for a partner goes on alone.
@@ -38,7 +38,7 @@ pub trait Streams {
     fn silent(limit: Duration) -> Self::Error;
 }
 
-/// What a step brought.
+/// The result of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// A whole picture of a stream.
@@ -81,7 +81,7 @@ impl<S: Streams> Streaming<S> {
     /// Switches streams on by `start` and drives them. Where `start` fails half-way, what is on already is stopped.
     ///
     /// # Errors
-    /// What `start` says.
+    /// The error of `start`.
     pub fn start(
         streams: S,
         limit: Duration,
@@ -95,7 +95,7 @@ impl<S: Streams> Streaming<S> {
     /// The next frame; `None` at the end.
     ///
     /// # Errors
-    /// What [`Streams::pop`] reports of one frame; after the last frame, once, what ended the streams.
+    /// The report of [`Streams::pop`] for one frame; after the last frame, once, what ended the streams.
     pub fn next_frame(&mut self) -> Result<Option<S::Frame>, S::Error> {
         loop {
             if let Some(frame) = self.streams.pop() {
@@ -264,7 +264,7 @@ mod tests {
         assert_eq!(Streaming::start(failing, limit, |_| Err("refused")).err(), Some("refused"));
         assert_eq!(stopped.get(), Some(true));
 
-        // A camera that is gone is not told.
+        // A camera that is gone gets no command.
         let gone = script(&[], false);
         let stopped = Rc::clone(&gone.stopped);
         assert_eq!(Streaming::new(gone, limit).next_frame(), Err("unplugged"));

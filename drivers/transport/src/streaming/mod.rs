@@ -1,4 +1,4 @@
-//! What all cameras that stream have in common: how they are driven and restarted, how their frames are numbered, and what
+//! Common to all cameras that stream: how they are driven and restarted, how their frames are numbered, and what
 //! may come beside depth.
 
 mod driver;
@@ -9,13 +9,13 @@ pub use driver::{Progress, Streaming, Streams};
 pub use numbering::Numbering;
 pub use transfers::next_transfer;
 
-/// What comes beside depth, of cameras that have colour and infrared.
+/// Images that come beside depth, of cameras that have colour and infrared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum VideoMode {
     /// Colour.
     #[default]
     Color,
-    /// What the depth camera sees, as grey.
+    /// The depth camera's picture, as grey.
     Infrared,
     /// Nothing.
     Off,

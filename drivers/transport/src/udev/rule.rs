@@ -18,7 +18,7 @@ pub fn rules(plugged: &[u16]) -> String {
     text
 }
 
-/// What to do where a vendor's camera may not be opened: the exact rule, and how to install it; for a camera that is not
+/// Advice where a vendor's camera may not be opened: the exact rule, and how to install it; for a camera that is not
 /// on USB (vendor 0) the group.
 pub fn advice(vendor: u16) -> String {
     if vendor == 0 {

@@ -1,4 +1,4 @@
-//! What a program sees of USB: a bus that lists and opens devices, and open devices.
+//! USB as a program sees it: a bus that lists and opens devices, and open devices.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use crate::{Transfer, TransportError};
 
 /// A bus that lists and opens devices.
 pub trait Bus: Send + Sync {
-    /// What is plugged in now, ordered by address.
+    /// The devices that are plugged in now, ordered by address.
     ///
     /// # Errors
     /// [`TransportError::Usb`] where the bus cannot be read at all.
@@ -26,7 +26,7 @@ pub trait Bus: Send + Sync {
 /// flight come back as [`crate::TransferStatus::Unplugged`] and everything else fails with
 /// [`TransportError::Unplugged`].
 pub trait UsbDevice: Send {
-    /// What was opened.
+    /// The thing that was opened.
     fn info(&self) -> &DeviceInfo;
 
     /// Its serial number; empty where it has none.

@@ -12,7 +12,7 @@ use crate::{TransportError, libusb::info_of, udev};
 /// A known camera that is plugged in.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct UsbCamera {
-    /// What people call it.
+    /// The name that people use.
     pub name: &'static str,
     /// Its family.
     pub family: known::Family,
@@ -22,7 +22,7 @@ pub struct UsbCamera {
     pub address: (u8, u8),
     /// Speed of its link.
     pub speed: LinkSpeed,
-    /// What keeps it from working, each with what to do; empty where all is well.
+    /// The problems that keep it from working, each with its remedy; empty where all is well.
     pub problems: Vec<String>,
 }
 

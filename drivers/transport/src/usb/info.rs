@@ -1,4 +1,4 @@
-//! What is known of a device without opening it, and the requests that it is sent.
+//! Facts about a device that is not open, and the requests that it is sent.
 
 use std::fmt;
 

@@ -23,7 +23,7 @@ pub struct Known {
     pub vendor: u16,
     /// USB product id.
     pub product: u16,
-    /// What people call it.
+    /// The name that people use.
     pub name: &'static str,
     /// Its family.
     pub family: Family,

@@ -16,5 +16,5 @@ pub use info::{DeviceInfo, LinkSpeed, Setup};
 pub(crate) use transfer::PacketResult;
 pub use transfer::{PacketStatus, Transfer, TransferKind, TransferStatus};
 
-/// What an isochronous packet takes on the bus (USB 2.0 §8.4.3.1): an eighth of a millisecond.
+/// The time of an isochronous packet on the bus (USB 2.0 §8.4.3.1): an eighth of a millisecond.
 pub const MICROFRAME: Duration = Duration::from_micros(125);

@@ -98,7 +98,7 @@ impl Transfer {
         self.status
     }
 
-    /// What came by bulk.
+    /// The bytes that came by bulk.
     pub fn data(&self) -> &[u8] {
         &self.bytes[..self.length.min(self.bytes.len())]
     }
@@ -108,7 +108,7 @@ impl Transfer {
         self.packet_size
     }
 
-    /// What came by isochronous packets, in their order; empty slices for packets that brought nothing.
+    /// The bytes that came by isochronous packets, in their order; empty slices for packets that brought nothing.
     pub fn packets(&self) -> impl ExactSizeIterator<Item = (PacketStatus, &[u8])> {
         self.packets.iter().enumerate().map(|(i, packet)| {
             let start = i * self.packet_size;

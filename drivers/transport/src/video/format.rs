@@ -40,7 +40,7 @@ impl fmt::Debug for FourCc {
 /// How a node's pictures are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PictureLayout {
-    /// What they hold.
+    /// Their content.
     pub format: FourCc,
     /// Columns.
     pub width: u32,

@@ -30,13 +30,13 @@ pub struct UsbPlace {
 pub struct NodeInfo {
     /// Such as `/dev/video2`.
     pub node: PathBuf,
-    /// What the driver calls the camera.
+    /// The driver's name for the camera.
     pub name: String,
     /// Where it is on USB; `None` for other cameras.
     pub usb: Option<UsbPlace>,
 }
 
-/// What the driver filled. Buffers of which it knows that bytes are missing are kept from callers; their numbers are
+/// The buffers that the driver filled. Those of which it knows that bytes are missing are kept from callers; their numbers are
 /// missing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VideoBuffer {
@@ -68,7 +68,7 @@ pub trait VideoNode: Send {
     /// True where it carries metadata of another node's pictures instead of pictures.
     fn is_metadata(&self) -> bool;
 
-    /// What the driver calls the camera.
+    /// The driver's name for the camera.
     fn name(&self) -> &str;
 
     /// Formats on offer, in the driver's order; for metadata nodes the list is empty.

@@ -5,7 +5,7 @@ use std::arch::x86_64::{__m128i, __m256, __m256i};
 use pulp::{cast, x86::V3};
 
 use super::{LANES, Lanes};
-use crate::element::{Element, FACING_MASK, FACING_SCALE, NORMAL_SCALE, X_SHIFT, Y_MASK, Y_SHIFT};
+use crate::element::{Element, NORMAL_SCALE, SLANT_MASK, SLANT_SCALE, X_SHIFT, Y_MASK, Y_SHIFT};
 
 /// Lanes in two AVX2 registers.
 #[derive(Debug, Clone, Copy)]
@@ -83,11 +83,9 @@ impl Lanes for Avx2 {
         cast([self.0.avx._mm256_cvttps_epi32(a[0]), self.0.avx._mm256_cvttps_epi32(a[1])])
     }
     #[inline(always)]
-    fn pack(self, [depth, facing, nx, ny]: [Self::F; 4]) -> [Element; LANES] {
-        let halves: [[u64; 8]; 2] = [
-            pack_half(self.0, depth[0], facing[0], nx[0], ny[0]),
-            pack_half(self.0, depth[1], facing[1], nx[1], ny[1]),
-        ];
+    fn pack(self, [depth, slant, nx, ny]: [Self::F; 4]) -> [Element; LANES] {
+        let halves: [[u64; 8]; 2] =
+            [pack_half(self.0, depth[0], slant[0], nx[0], ny[0]), pack_half(self.0, depth[1], slant[1], nx[1], ny[1])];
         let packed: [u64; LANES] = cast(halves);
         packed.map(Element)
     }
@@ -133,14 +131,14 @@ fn whole_numbers(simd: V3, a: __m256) -> [__m128i; 2] {
 }
 
 #[inline(always)]
-fn pack_half(simd: V3, depth: __m256, facing: __m256, nx: __m256, ny: __m256) -> [u64; 8] {
+fn pack_half(simd: V3, depth: __m256, slant: __m256, nx: __m256, ny: __m256) -> [u64; 8] {
     let (avx, avx2) = (simd.avx, simd.avx2);
     let whole = |a: __m256, scale: f32| avx._mm256_cvtps_epi32(avx._mm256_mul_ps(a, avx._mm256_set1_ps(scale)));
     let low_bits = |a: __m256i, bits: i32| avx2._mm256_and_si256(a, avx._mm256_set1_epi32(bits));
     let x = avx2._mm256_slli_epi32::<{ X_SHIFT as i32 }>(whole(nx, NORMAL_SCALE));
     let y = avx2._mm256_slli_epi32::<{ Y_SHIFT as i32 }>(low_bits(whole(ny, NORMAL_SCALE), Y_MASK));
-    let slant = low_bits(whole(facing, -FACING_SCALE), FACING_MASK);
-    let normal = avx2._mm256_or_si256(avx2._mm256_or_si256(x, y), slant);
+    let slant_bits = low_bits(whole(slant, -SLANT_SCALE), SLANT_MASK);
+    let normal = avx2._mm256_or_si256(avx2._mm256_or_si256(x, y), slant_bits);
     let depth = avx._mm256_castps_si256(depth);
     let [a, c]: [__m128i; 2] = cast(avx2._mm256_unpacklo_epi32(depth, normal));
     let [b, d]: [__m128i; 2] = cast(avx2._mm256_unpackhi_epi32(depth, normal));
@@ -158,9 +156,9 @@ fn unpack_half(simd: V3, e: [u64; 8]) -> [__m256; 4] {
     let x = avx2._mm256_srai_epi32::<{ X_SHIFT as i32 }>(normal);
     let y =
         avx2._mm256_srai_epi32::<{ X_SHIFT as i32 }>(avx2._mm256_slli_epi32::<{ (X_SHIFT - Y_SHIFT) as i32 }>(normal));
-    let slant = avx2._mm256_and_si256(normal, avx._mm256_set1_epi32(FACING_MASK));
+    let slant_bits = avx2._mm256_and_si256(normal, avx._mm256_set1_epi32(SLANT_MASK));
     let scaled = |a: __m256i, unit: f32| avx._mm256_mul_ps(avx._mm256_cvtepi32_ps(a), avx._mm256_set1_ps(unit));
-    [depth, scaled(slant, -1.0 / FACING_SCALE), scaled(x, 1.0 / NORMAL_SCALE), scaled(y, 1.0 / NORMAL_SCALE)]
+    [depth, scaled(slant_bits, -1.0 / SLANT_SCALE), scaled(x, 1.0 / NORMAL_SCALE), scaled(y, 1.0 / NORMAL_SCALE)]
 }
 
 #[inline(always)]

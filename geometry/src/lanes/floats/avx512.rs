@@ -5,7 +5,7 @@ use std::arch::x86_64::{__m512, __m512i, __mmask16};
 use pulp::{cast, x86::V4};
 
 use super::{LANES, Lanes};
-use crate::element::{Element, FACING_MASK, FACING_SCALE, NORMAL_SCALE, X_SHIFT, Y_MASK, Y_SHIFT};
+use crate::element::{Element, NORMAL_SCALE, SLANT_MASK, SLANT_SCALE, X_SHIFT, Y_MASK, Y_SHIFT};
 
 /// Lanes in one AVX-512 register.
 #[derive(Debug, Clone, Copy)]
@@ -82,14 +82,14 @@ impl Lanes for Avx512 {
         cast(self.0.avx512f._mm512_cvttps_epi32(a))
     }
     #[inline(always)]
-    fn pack(self, [depth, facing, nx, ny]: [Self::F; 4]) -> [Element; LANES] {
+    fn pack(self, [depth, slant, nx, ny]: [Self::F; 4]) -> [Element; LANES] {
         let simd = self.0.avx512f;
         let whole = |a: __m512, scale: f32| simd._mm512_cvtps_epi32(simd._mm512_mul_ps(a, simd._mm512_set1_ps(scale)));
         let low_bits = |a: __m512i, bits: i32| simd._mm512_and_si512(a, simd._mm512_set1_epi32(bits));
         let x = simd._mm512_slli_epi32::<X_SHIFT>(whole(nx, NORMAL_SCALE));
         let y = simd._mm512_slli_epi32::<Y_SHIFT>(low_bits(whole(ny, NORMAL_SCALE), Y_MASK));
-        let slant = low_bits(whole(facing, -FACING_SCALE), FACING_MASK);
-        let normal = simd._mm512_or_si512(simd._mm512_or_si512(x, y), slant);
+        let slant_bits = low_bits(whole(slant, -SLANT_SCALE), SLANT_MASK);
+        let normal = simd._mm512_or_si512(simd._mm512_or_si512(x, y), slant_bits);
         let depth = simd._mm512_castps_si512(depth);
         let (a, b) = (simd._mm512_unpacklo_epi32(depth, normal), simd._mm512_unpackhi_epi32(depth, normal));
         let first = simd._mm512_permutex2var_epi64(a, cast([0u64, 1, 8, 9, 2, 3, 10, 11]), b);
@@ -107,9 +107,9 @@ impl Lanes for Avx512 {
         let normal = simd._mm512_castps_si512(normal);
         let x = simd._mm512_srai_epi32::<{ X_SHIFT }>(normal);
         let y = simd._mm512_srai_epi32::<{ X_SHIFT }>(simd._mm512_slli_epi32::<{ X_SHIFT - Y_SHIFT }>(normal));
-        let slant = simd._mm512_and_si512(normal, simd._mm512_set1_epi32(FACING_MASK));
+        let slant_bits = simd._mm512_and_si512(normal, simd._mm512_set1_epi32(SLANT_MASK));
         let scaled = |a: __m512i, unit: f32| simd._mm512_mul_ps(simd._mm512_cvtepi32_ps(a), simd._mm512_set1_ps(unit));
-        [depth, scaled(slant, -1.0 / FACING_SCALE), scaled(x, 1.0 / NORMAL_SCALE), scaled(y, 1.0 / NORMAL_SCALE)]
+        [depth, scaled(slant_bits, -1.0 / SLANT_SCALE), scaled(x, 1.0 / NORMAL_SCALE), scaled(y, 1.0 / NORMAL_SCALE)]
     }
     #[inline(always)]
     fn bytes(self, values: [[[u8; 4]; LANES / 2]; 2]) -> [Self::F; 4] {

@@ -81,8 +81,8 @@ impl Lanes for Scalar {
         a.map(|x| x as u32)
     }
     #[inline(always)]
-    fn pack(self, [depth, facing, nx, ny]: [Self::F; 4]) -> [Element; LANES] {
-        each(|k| Element::new(depth[k], facing[k], [nx[k], ny[k]]))
+    fn pack(self, [depth, slant, nx, ny]: [Self::F; 4]) -> [Element; LANES] {
+        each(|k| Element::new(depth[k], slant[k], [nx[k], ny[k]]))
     }
     #[inline(always)]
     fn unpack(self, elements: [[Element; LANES / 2]; 2]) -> [Self::F; 4] {

@@ -20,7 +20,7 @@ pub struct PictureSize {
 pub struct StreamFormat {
     /// `bFormatIndex`.
     pub index: u8,
-    /// What it is.
+    /// Its identity.
     pub code: FourCc,
     /// Its sizes.
     pub sizes: Vec<PictureSize>,
