@@ -47,3 +47,46 @@ fn a_wall_and_a_ball_are_refused() {
         assert!(!fit.report.reasons.is_empty());
     }
 }
+
+/// A flat figure like a gingerbread man.
+fn flat_figure() -> Mesh {
+    let leg = |x: f32| cuboid([x - 0.09, 0.0, -0.03], [x + 0.09, 0.8, 0.03]);
+    joined(&[
+        cuboid([-0.22, 0.67, -0.03], [0.22, 1.42, 0.03]),
+        cuboid([-0.65, 1.17, -0.03], [0.65, 1.33, 0.03]),
+        ellipsoid([0.0, 1.55, 0.0], [0.18, 0.18, 0.03], 6),
+        leg(-0.14),
+        leg(0.14),
+    ])
+}
+
+fn horse() -> Mesh {
+    let leg = |x: f32, z: f32| ellipsoid([x, 0.45, z], [0.07, 0.47, 0.07], 8);
+    joined(&[
+        ellipsoid([0.0, 1.1, 0.0], [0.75, 0.3, 0.28], 7),
+        ellipsoid([0.8, 1.55, 0.0], [0.16, 0.45, 0.13], 9),
+        ellipsoid([1.0, 1.85, 0.0], [0.3, 0.12, 0.1], 10),
+        leg(0.5, 0.15),
+        leg(0.5, -0.15),
+        leg(-0.5, 0.15),
+        leg(-0.5, -0.15),
+    ])
+}
+
+#[test]
+fn what_is_not_a_person_is_refused_even_where_clothes_are_expected() {
+    let model = BodyModel::load_default().unwrap();
+    let shapes = [
+        ("a box", finer(&cuboid([-0.25, 0.0, -0.15], [0.25, 1.7, 0.15]), 5)),
+        ("a thick column", ellipsoid([0.0, 0.87, 0.0], [0.25, 0.9, 0.25], 11)),
+        ("a thin column", finer(&cuboid([-0.09, 0.0, -0.09], [0.09, 1.7, 0.09]), 5)),
+        ("a flat figure", finer(&flat_figure(), 2)),
+        ("a horse", horse()),
+        ("a ball", ellipsoid([0.0, 0.85, 0.0], [0.85; 3], 12)),
+    ];
+    for (name, scan) in shapes {
+        let settings = FitSettings { dressed: true, ..FitSettings::default() };
+        let fit = fit_body(&model, &scan, &settings, &|_| {}).unwrap();
+        assert_eq!(fit.verdict(), Verdict::Failed, "{name}: {:?}", fit.report);
+    }
+}

@@ -14,8 +14,8 @@ use crate::surface::{Cloud, Samples};
 const DISTANCE_CELL: f32 = 0.012;
 /// Cell of the scan's samples that coverage is taken from, metres.
 const COVER_CELL: f32 = 0.01;
-/// Distances are looked for within this and counted as this beyond it, metres.
-const FARTHEST: f32 = 0.1;
+/// Distances are looked for within this and counted as this beyond it, metres: far more than any cloth stands off.
+const FARTHEST: f32 = 0.5;
 /// Smallest cosine between the normals of scan and body: points of the same side only.
 const SAME_SIDE: f32 = 0.0;
 /// The same where the scan is to cover a vertex.
@@ -104,5 +104,10 @@ impl Coverage {
         };
         let region = |r: &Region| (r.words().to_owned(), share(&|v| model.regions[v] == *r));
         Self { whole: share(&|_| true), regions: Region::ALL.iter().map(region).collect() }
+    }
+
+    /// The share of one region, 0–1.
+    pub fn of(&self, region: Region) -> f64 {
+        self.regions.get(region.words()).copied().unwrap_or(0.0)
     }
 }

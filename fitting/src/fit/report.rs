@@ -48,6 +48,8 @@ pub struct FitReport {
     pub body_covered: f64,
     /// Share of the scan's trusted surface that lies within 20 mm of the body (100 mm where the person is dressed), 0–1.
     pub scan_explained: f64,
+    /// Share of the head's outer surface with scan within 15 mm, dressed or not, 0–1.
+    pub head_covered: f64,
     /// Root mean square of β: 1 for an ordinary body.
     pub shape_rms: f64,
     /// Shape and measures are estimated: the person was dressed.

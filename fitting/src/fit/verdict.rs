@@ -1,7 +1,7 @@
 //! Whether a fit is to be trusted: a table of rules over shares (0–1), metres and standard deviations.
 
 use nalgebra::Point3;
-use toile_character::BodyModel;
+use toile_character::{BodyModel, Region};
 use toile_geometry::Mesh;
 
 use super::{
@@ -75,15 +75,19 @@ const ON_SKIN: [Rule; 7] = [
     UNUSUAL,
 ];
 
-/// Clothes leave more over and stand off the model; whoever is dressed is estimated.
-const UNDER_CLOTHES: [Rule; 7] = [
+/// Clothes leave more over and stand off the model, and whoever is dressed is estimated; but a face is seen whatever else
+/// is covered, and the prior keeps shapes ordinary. Of six dressed takes of generated people the head is covered by 0.88 to
+/// 0.92 and shapes reach 0.95; of 31 shapes that are not persons two came near: a thin column (0.54 and 2.2) and a flat
+/// figure (0.17 and 1.8). A hood may hide two thirds of a head.
+const UNDER_CLOTHES: [Rule; 8] = [
     Rule { doubtful: Bounds::Below(0.97), failed: Bounds::Below(0.80), ..EXPLAINED },
     Rule { doubtful: Bounds::Below(0.60), failed: Bounds::Below(0.25), ..COVERED },
     HIDDEN,
     Rule { doubtful: Bounds::Above(0.040), failed: Bounds::Above(0.100), ..MODEL_DISTANCE },
+    HEAD,
     DRESSED,
     STATURE,
-    UNUSUAL,
+    Rule { doubtful: Bounds::Above(1.6), failed: Bounds::Above(2.0), ..UNUSUAL },
 ];
 
 const EXPLAINED: Rule = Rule {
@@ -139,6 +143,16 @@ const BODY_DISTANCE: Rule = Rule {
     },
 };
 
+const HEAD: Rule = Rule {
+    value: |e| e.report.head_covered,
+    doubtful: Bounds::Below(0.6),
+    failed: Bounds::Below(0.3),
+    reason: |e| {
+        let head = 100.0 * e.report.head_covered;
+        format!("only {head:.0} % of the head lies on the scan: is it a person, and is the face uncovered?")
+    },
+};
+
 const DRESSED: Rule = Rule {
     value: |e| f64::from(u8::from(e.report.estimated)),
     doubtful: Bounds::Above(0.0),
@@ -151,7 +165,7 @@ const DRESSED: Rule = Rule {
 const STATURE: Rule = Rule {
     value: |e| e.stature,
     doubtful: Bounds::Outside(1.35, 2.2),
-    failed: Bounds::Outside(0.6, 2.5),
+    failed: Bounds::Outside(1.0, 2.5),
     reason: |e| {
         let stature = e.stature;
         format!(
@@ -208,12 +222,18 @@ pub(crate) fn judge(
         scan_to_body: Distances::new(&samples, points, model).stats(),
         body_covered: covered.whole,
         scan_explained: to_model.share_within(reach.explained),
+        head_covered: if dressed { bare_head(model, points, scan, trust) } else { covered.of(Region::Head) },
         shape_rms: (beta.iter().map(|b| b * b).sum::<f64>() / beta.len().max(1) as f64).sqrt(),
         estimated: dressed,
         region_covered: covered.regions,
     };
     decide(&mut report, measurements.stature_m);
     report
+}
+
+/// Share of the head that the scan covers as closely as skin: whatever else is dressed, a face is seen.
+fn bare_head(model: &BodyModel, points: &[Point3<f32>], scan: &Mesh, trust: &[f32]) -> f64 {
+    Coverage::new(model, points, scan, trust, SKIN.covered).of(Region::Head)
 }
 
 /// Sets verdict and reasons; regions that do not matter for the rest of the body become a notice.
@@ -223,7 +243,8 @@ fn decide(report: &mut FitReport, stature: f64) {
     let evidence = Evidence { report, hidden: &large, stature };
     let mut verdict = Verdict::Trusted;
     let mut reasons = Vec::new();
-    for rule in if report.estimated { &UNDER_CLOTHES } else { &ON_SKIN } {
+    let rules: &[Rule] = if report.estimated { &UNDER_CLOTHES } else { &ON_SKIN };
+    for rule in rules {
         let value = (rule.value)(&evidence);
         let has_failed = rule.failed.is_exceeded(value);
         if has_failed || rule.doubtful.is_exceeded(value) {
@@ -264,6 +285,7 @@ mod tests {
             scan_to_body: DistanceStats { mean_mm: 1.0, ..DistanceStats::default() },
             body_covered: 0.95,
             scan_explained: 0.999,
+            head_covered: 0.9,
             shape_rms: 1.0,
             estimated,
             region_covered: [("left hand".into(), 0.1), ("torso".into(), 0.9)].into(),
@@ -292,7 +314,12 @@ mod tests {
         assert_eq!(judged(FitReport { scan_to_model: far(9.0), ..good(true) }, 1.7), (Verdict::Doubtful, 1));
         assert_eq!(judged(FitReport { scan_to_body: far(4.0), ..good(false) }, 1.7), (Verdict::Doubtful, 1));
         assert_eq!(judged(FitReport { shape_rms: 2.5, ..good(false) }, 1.7), (Verdict::Doubtful, 1));
-        assert_eq!(judged(good(false), 1.0), (Verdict::Doubtful, 1));
+        assert_eq!(judged(FitReport { shape_rms: 2.5, ..good(true) }, 1.7), (Verdict::Failed, 2));
+        assert_eq!(judged(FitReport { head_covered: 0.5, ..good(true) }, 1.7), (Verdict::Doubtful, 2));
+        assert_eq!(judged(FitReport { head_covered: 0.2, ..good(true) }, 1.7), (Verdict::Failed, 2));
+        assert_eq!(judged(FitReport { head_covered: 0.2, ..good(false) }, 1.7), (Verdict::Trusted, 0));
+        assert_eq!(judged(good(false), 1.15), (Verdict::Doubtful, 1));
+        assert_eq!(judged(good(false), 0.72), (Verdict::Failed, 1));
         assert_eq!(judged(good(false), f64::NAN), (Verdict::Failed, 1));
         let three = FitReport { scan_to_body: far(4.0), shape_rms: 2.5, ..explained };
         assert_eq!(judged(three, 1.7), (Verdict::Failed, 3));
