@@ -88,7 +88,7 @@ fn a_wrong_pose_file_is_named_with_line_and_reason() {
         ("1.0 0 0 inf 0 0 0 1\n", "line 1: `inf` is not a finite number"),
         ("1.0 0 0 0 0 0 0 2\n", "line 1: the rotation qx qy qz qw has length 2.000"),
         ("soon 0 0 0 0 0 0 1\n", "line 1: `soon` is not a time"),
-        ("# nothing\n", "holds no pose"),
+        ("# nothing\n", "does not hold a pose"),
         ("900.0 0 0 0 0 0 0 1\n", "a known pose within 5 ms"),
     ];
     for (text, reason) in wrong {
