@@ -3,8 +3,7 @@
 # controller and the unmodified `toile capture` records from them, through libusb and through V4L2. Then clients that we
 # did not write stream from the same devices: the fidelity gate. Its requirements are downloaded once into
 # target/outside/wire/ and kept (rig.sh). Prints a line for each check: WIRE kinect1 PASS 100/100, FIDELITY
-# freenect-camtest PASS, or SKIPPED and why: what the machine lacks, time included, is not a fault, unless
-# TOILE_REQUIRE_OUTSIDE=1 asks for every check.
+# freenect-camtest PASS, or SKIPPED and why: what the machine lacks, time included, is not a fault.
 set -euo pipefail
 export LC_ALL=C
 cd "$(dirname "$0")/../.."
@@ -17,7 +16,6 @@ limit=${WIRE_SECONDS:-1500}
 kinect2_frames=${WIRE_KINECT2_FRAMES:-100}
 kinect2_cycles=${WIRE_KINECT2_CYCLES:-2}
 examples="$PWD/target/release/examples"
-required=$([ "${TOILE_REQUIRE_OUTSIDE:-}" = 1 ] && echo 1 || echo 0)
 checks=("WIRE kinect1" "FIDELITY freenect-camtest" "FIDELITY gspca_kinect" "WIRE kinect1 first frame" "WIRE kinect1 unplug"
     "WIRE kinect2" "WIRE kinect2 unplug" "WIRE stereo" "WIRE realsense-bulk"
     "WIRE realsense-bulk first frame" "WIRE realsense-isochronous" "FIDELITY pyrealsense2"
@@ -26,8 +24,7 @@ checks=("WIRE kinect1" "FIDELITY freenect-camtest" "FIDELITY gspca_kinect" "WIRE
 skip() {
     local check
     for check in "${checks[@]}"; do echo "$check SKIPPED: $1"; done
-    [ "$required" != 1 ] || echo "WIRE FAIL: TOILE_REQUIRE_OUTSIDE=1 asks for every check"
-    exit "$required"
+    exit 0
 }
 
 [ "$(uname -sm)" = "Linux x86_64" ] || skip "the virtual machine is made for Linux on x86-64"
@@ -59,8 +56,7 @@ wanted() { # check
     case ",${WIRE_ONLY:-}," in ,, | *",${name%%[ -]*},"*) ;; *) return 1 ;; esac
 }
 
-# The line of each check in their order, and how long it all took; fails where one failed, has none, or was skipped
-# although every check is required.
+# The line of each check in their order, and how long it all took; fails where one failed or has none.
 report() { # status of the virtual machine
     local check
     local without="FAIL: the virtual machine ended before it; see $rig/out/"
@@ -72,10 +68,6 @@ report() { # status of the virtual machine
     done | tee "$rig/out/lines"
     grep "^WIRE FAIL" "$rig/out/result" || true
     echo "WIRE took $((SECONDS - start)) s"
-    if [ "$required" = 1 ] && grep -q SKIPPED "$rig/out/lines"; then
-        echo "WIRE FAIL: checks were skipped, and TOILE_REQUIRE_OUTSIDE=1 asks for every check"
-        return 1
-    fi
     ! grep -q FAIL "$rig/out/lines" "$rig/out/result"
 }
 
