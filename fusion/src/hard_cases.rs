@@ -68,6 +68,28 @@ fn a_camera_on_its_side_or_upside_down_gives_an_upright_scan() {
 }
 
 #[test]
+fn a_few_views_in_uneven_steps_are_all_used_and_go_round() {
+    for stops in [
+        vec![0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0],
+        vec![0.0, 38.0, 62.0, 110.0, 150.0, 171.0, 219.0, 260.0, 301.0, 338.0],
+    ] {
+        let scene = Scene::new();
+        let angles: Vec<Option<f64>> = stops.iter().map(|d: &f64| Some(d.to_radians())).collect();
+        let scan = fuse(&mut scene.source(&angles), &settings(), &|_| {}).unwrap();
+        assert!(scan.report.dropped.is_empty(), "{:?}", scan.report.dropped);
+        let turned = stops[stops.len() - 1];
+        assert!((scan.report.turned_deg - turned).abs() < 1.0, "{} of {turned}°", scan.report.turned_deg);
+        assert!(scan.report.full_turn);
+        for (k, angle) in angles.iter().enumerate() {
+            let truth = scene.figure_from_camera(0.0).inverse() * scene.figure_from_camera(angle.unwrap());
+            let found = scan.trajectory[0].scan_from_camera.inverse() * scan.trajectory[k].scan_from_camera;
+            let off = found.rotation.angle_to(&truth.rotation).to_degrees();
+            assert!(off < 0.6, "view {k} is {off}° off");
+        }
+    }
+}
+
+#[test]
 fn known_poses_fill_soles_where_they_are_and_not_at_their_frames_zero() {
     let (scene, angles) = (Scene::new(), steps(12, 30.0));
     let raised = Rigid::translation(0.0, -0.8, 0.0);

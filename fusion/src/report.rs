@@ -45,7 +45,7 @@ pub struct FusionReport {
     pub sensors_not_used: Vec<String>,
     /// Degrees turned about the axis from the first to the last fused frame.
     pub turned_deg: f64,
-    /// True when the turn is at least 340°.
+    /// True when the turn is at least 340°, or when the step that closes it is about as wide as the widest one in it.
     pub full_turn: bool,
     /// Degrees a second, mean.
     pub rate_deg_per_s: f64,

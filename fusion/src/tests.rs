@@ -271,7 +271,7 @@ fn an_empty_room_holds_nobody() {
 #[test]
 fn a_foreign_frame_is_left_out_and_a_gap_is_crossed() {
     let scene = Scene::new();
-    let mut angles = steps(40, 6.0);
+    let mut angles = steps(60, 4.0);
     angles[20] = Some(angles[20].unwrap() + 2.5); // somebody jumped
     let mut source = scene.source(&angles);
     source.frames.drain(25..27);

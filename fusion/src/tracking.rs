@@ -16,14 +16,16 @@ mod starts;
 mod tracked;
 mod tracker;
 mod trust;
+mod views;
 
-pub(crate) use axis::{Axis, find_axis, total_turn};
+pub(crate) use axis::{Axis, find_axis, total_turn, widest_step};
 pub(crate) use equations::{NormalEquations, increment};
 pub(crate) use kept::{Kept, KeptFrame, Past};
 pub(crate) use open_directions::{DEGENERATE, hold_open_directions};
 pub(crate) use registration::register;
 pub(crate) use samples::{Sample, samples};
 pub(crate) use tracker::Tracker;
+pub(crate) use views::MAX_VIEWS;
 
 pub use approach::track;
 pub use tracked::Tracked;

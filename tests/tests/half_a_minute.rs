@@ -12,7 +12,8 @@ use toile_geometry::{Mesh, ply};
 const LOW: f32 = 0.02;
 
 fn toile(words: &[&str]) -> Value {
-    let done = Command::new(env!("CARGO_BIN_EXE_toile-under-test")).args(words).args(["--json", "-q"]).output().unwrap();
+    let done =
+        Command::new(env!("CARGO_BIN_EXE_toile-under-test")).args(words).args(["--json", "-q"]).output().unwrap();
     let answer: Value = serde_json::from_slice(&done.stdout).unwrap_or_default();
     assert_eq!(done.status.code(), Some(0), "{words:?}: {answer} {}", String::from_utf8_lossy(&done.stderr));
     answer

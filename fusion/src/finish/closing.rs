@@ -10,7 +10,7 @@ use toile_geometry::{Rigid, statistics::median, transform_point};
 
 use crate::{
     frame::{DepthView, dot},
-    tracking::{NormalEquations, Sample, hold_open_directions, increment, samples},
+    tracking::{MAX_VIEWS, NormalEquations, Sample, hold_open_directions, increment, samples},
 };
 
 /// Points of a frame used in each pair.
@@ -19,6 +19,8 @@ const POINTS: usize = 1500;
 const PROBES: usize = 150;
 /// Smallest share of probes that a partner must see.
 const MIN_OVERLAP: f64 = 0.4;
+/// The same where each view has but its two neighbours.
+const MIN_OVERLAP_OF_VIEWS: f64 = 0.2;
 /// Index distances of pairs along the way.
 const STRIDES: [usize; 7] = [1, 2, 3, 5, 8, 13, 21];
 /// Of farther pairs (across the seam, or back at a place seen before) one in this many is used.
@@ -144,8 +146,11 @@ fn match_pixel(view: &DepthView, p: &Point3<f32>, normal: [f32; 3], gate: f32) -
 fn overlapping_pairs(nodes: &[Node], poses: &[Rigid]) -> Vec<(usize, usize)> {
     let count = nodes.len();
     let far = STRIDES[STRIDES.len() - 1];
-    let wanted =
-        |i: usize, j: usize| STRIDES.contains(&(j - i)) || (j - i > far && (i + 2 * j).is_multiple_of(SEAM_THINNING));
+    // Of a few views each overlaps its neighbours alone, the last one the first.
+    let are_views = count <= MAX_VIEWS;
+    let wanted = |i: usize, j: usize| {
+        are_views || STRIDES.contains(&(j - i)) || (j - i > far && (i + 2 * j).is_multiple_of(SEAM_THINNING))
+    };
     let all: Vec<(usize, usize)> =
         (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))).filter(|&(i, j)| wanted(i, j)).collect();
     let overlaps = |&&(i, j): &&(usize, usize)| {
@@ -162,7 +167,8 @@ fn overlapping_pairs(nodes: &[Node], poses: &[Rigid]) -> Vec<(usize, usize)> {
             let normal = turn * nalgebra::Vector3::from(s.normal);
             match_pixel(nodes[j].view, &transform_point(&b_from_a, &s.point), normal.into(), 0.05).is_some()
         });
-        seen.count() as f64 >= MIN_OVERLAP * total.max(1) as f64
+        let least = if are_views { MIN_OVERLAP_OF_VIEWS } else { MIN_OVERLAP };
+        seen.count() as f64 >= least * total.max(1) as f64
     };
     all.par_iter().filter(overlaps).copied().collect()
 }

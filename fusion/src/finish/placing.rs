@@ -1,5 +1,7 @@
 //! The scan's frame: upright on the disk, facing the first camera.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use toile_geometry::{Mesh, Rigid};
 
@@ -7,11 +9,13 @@ use crate::{
     Prior,
     report::FusionReport,
     take::Fuser,
-    tracking::{Axis, find_axis, total_turn},
+    tracking::{Axis, find_axis, total_turn, widest_step},
 };
 
 /// A turn of this many degrees is a full one.
 const FULL_TURN_DEG: f64 = 340.0;
+/// The step from the last frame on to the first is at most this many times as wide as the widest other one.
+const ROUND_AGAIN: f64 = 1.3;
 /// An axis is believed where frames turned about it by more than this, radians.
 const AXIS_TURN: f64 = 0.5;
 
@@ -24,7 +28,8 @@ pub(crate) fn place(fuser: &Fuser, raw: &Mesh, report: &mut FusionReport) -> Rig
     let poses = fuser.kept.poses();
     let found = find_axis(&poses);
     let turned = found.map_or(0.0, |a| total_turn(&a, &poses));
-    report_turn(fuser, turned, report);
+    let widest = found.map_or(0.0, |a| widest_step(&a, &poses));
+    report_turn(fuser, (turned, widest), report);
     // Without a volume the model's frame is the first camera's, whose +Y points down.
     let up = if volume.is_some() { Vector3::y() } else { -Vector3::y() };
     let has_floor = volume.as_ref().is_some_and(|v| v.floor.is_some());
@@ -43,11 +48,14 @@ pub(crate) fn place(fuser: &Fuser, raw: &Mesh, report: &mut FusionReport) -> Rig
     scan_from_model(&axis, &poses[0], ground)
 }
 
-fn report_turn(fuser: &Fuser, turned: f64, report: &mut FusionReport) {
+/// Reports the turn from the first to the last frame, and the widest step in it, radians.
+fn report_turn(fuser: &Fuser, (turned, widest): (f64, f64), report: &mut FusionReport) {
     let frames = &fuser.kept.frames;
     let span = frames.last().map_or(0, |k| k.device_time_ns) - frames[0].device_time_ns;
     report.turned_deg = turned.abs().to_degrees();
-    report.full_turn = report.turned_deg >= FULL_TURN_DEG;
+    // Eight views in steps of 45° go all round, although the last one is 315° from the first.
+    let goes_round = (TAU - turned.abs()) < ROUND_AGAIN * widest;
+    report.full_turn = report.turned_deg >= FULL_TURN_DEG || goes_round;
     report.rate_deg_per_s = report.turned_deg / (span as f64 * 1e-9).max(1e-6);
 }
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use toile_capture::{DepthImage, Frame, Rig, Source, depth_codec};
 
 use super::{
-    fuser::Fuser,
+    fuser::{Fuser, Outcome},
     preparer::{Filter, first_sensor},
 };
 use crate::{
@@ -16,6 +16,7 @@ use crate::{
     report::DroppedFrame,
     subject::{SURVEY_FRAMES, SubjectVolume, find_volume},
     timings::Stopwatch,
+    tracking::MAX_VIEWS,
 };
 
 /// Frames after this many wait packed, so that a long take fits in memory.
@@ -72,13 +73,26 @@ pub fn fuse(
     fuser.log.seen += unreadable.len();
     fuser.log.dropped.extend(unreadable);
     fuser.log.sensors_not_used = other_sensors;
+    push_all(&mut fuser, frames, progress)?;
+    finish(fuser, &|x| progress(0.5 + 0.5 * x))
+}
+
+/// Pushes every frame; a few views are tried again where they could not be placed at once.
+fn push_all(fuser: &mut Fuser, frames: Vec<Waiting>, progress: &(dyn Fn(f32) + Sync)) -> Result<(), FusionError> {
     let count = frames.len().max(1) as f32;
+    let are_views = frames.len() <= MAX_VIEWS;
+    if are_views {
+        fuser.expect_few_views();
+    }
+    let mut dropped = Vec::new();
     for (i, frame) in frames.into_iter().enumerate() {
         let frame = fuser.clock.time("unpack", || frame.unpacked());
-        fuser.push(&frame)?;
+        if matches!(fuser.push(&frame)?, Outcome::Dropped { .. }) && are_views {
+            dropped.push(frame);
+        }
         progress(0.1 + 0.4 * (i + 1) as f32 / count);
     }
-    finish(fuser, &|x| progress(0.5 + 0.5 * x))
+    if dropped.is_empty() { Ok(()) } else { fuser.retry(dropped) }
 }
 
 /// Frames with depth spread over the take.

@@ -103,6 +103,37 @@ impl Fuser {
         Ok(Outcome::Fused { model_from_camera: located.model_from_camera, tracked: located.tracked })
     }
 
+    /// Tells the tracker that few frames will come, in wide and uneven steps of a turntable.
+    pub(crate) fn expect_few_views(&mut self) {
+        self.tracker.expect_few_views();
+    }
+
+    /// Tries dropped frames again, now that the model shows more, until no further one can be placed; then all frames are
+    /// in the order of time.
+    ///
+    /// # Errors
+    /// [`FusionError::TooLarge`] where the model outgrows its index.
+    pub(crate) fn retry(&mut self, mut dropped: Vec<Frame>) -> Result<(), FusionError> {
+        let mut placed = true;
+        while std::mem::take(&mut placed) {
+            // The turn closes on its first frame: the last ones lie next to what is there.
+            for frame in std::mem::take(&mut dropped).into_iter().rev() {
+                let log = (self.log.seen, self.log.dropped.len());
+                let is_fused = matches!(self.push(&frame)?, Outcome::Fused { .. });
+                self.log.seen = log.0;
+                self.log.dropped.truncate(log.1);
+                if is_fused {
+                    self.log.dropped.retain(|d| d.index != frame.index);
+                    placed = true;
+                } else {
+                    dropped.insert(0, frame);
+                }
+            }
+        }
+        self.kept.frames.sort_by_key(|k| (k.device_time_ns, k.index));
+        Ok(())
+    }
+
     /// Frames in a row without a trusted pose; 0 while the subject is followed.
     pub fn lost_frames(&self) -> usize {
         self.tracker.lost_frames()

@@ -69,6 +69,11 @@ fn spans(poses: &[Rigid]) -> Vec<Rigid> {
     (step..poses.len()).map(|k| poses[k] * poses[k - step].inverse()).collect()
 }
 
+/// The widest turn about the axis between two poses that follow each other, radians.
+pub fn widest_step(axis: &Axis, poses: &[Rigid]) -> f64 {
+    poses.windows(2).map(|w| axis.angle(&(w[1] * w[0].inverse())).abs()).fold(0.0, f64::max)
+}
+
 /// Total turn about the axis over poses in order, radians.
 pub fn total_turn(axis: &Axis, poses: &[Rigid]) -> f64 {
     poses.windows(2).map(|w| axis.angle(&(w[1] * w[0].inverse()))).sum()

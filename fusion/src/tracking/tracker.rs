@@ -14,6 +14,7 @@ use super::{
     starts::{FIRST_TURNS, best_of, turned},
     tracked::{Located, Tracked},
     trust::trusted,
+    views::place_view,
 };
 use crate::{
     drop_reason::DropReason,
@@ -45,6 +46,8 @@ pub(crate) struct Tracker {
     motion: MotionModel,
     lost: Lost,
     pictures: Pictures,
+    /// The take is a set of a few views on a turntable, in steps of any width.
+    has_few_views: bool,
 }
 
 impl Tracker {
@@ -57,7 +60,13 @@ impl Tracker {
             motion: MotionModel::new(settings.prior),
             lost: Lost::default(),
             pictures: Pictures::new(sensor),
+            has_few_views: false,
         }
+    }
+
+    /// Expects wide and uneven steps from now on, where there is a turntable.
+    pub(crate) fn expect_few_views(&mut self) {
+        self.has_few_views = self.prior == Prior::Turntable;
     }
 
     /// Frames in a row without a trusted pose.
@@ -138,6 +147,12 @@ impl Tracker {
         predicted: &Rigid,
         clock: &mut Stopwatch,
     ) -> Result<Located, DropReason> {
+        if self.has_few_views
+            && let Some(other) = past.kept.frames.last()
+        {
+            let tracked = clock.time("search", || place_view(past, view, &other.model_from_camera))?;
+            return Ok(self.found(tracked));
+        }
         let axis = self.motion.axis();
         // Without an axis there is nothing to search about.
         if self.lost.frames <= PATIENCE || axis.is_none() {

@@ -30,17 +30,26 @@ pub(crate) fn trusted(
     truncation: f32,
     expected: Option<&Rigid>,
 ) -> Result<(), DropReason> {
-    let Tracked { overlap, inliers, residual, .. } = *tracked;
-    if overlap < OVERLAP {
-        return Err(DropReason::LittleOverlap { overlap });
-    }
-    if inliers < INLIERS || residual > residual_limit(view, residual, truncation) {
-        return Err(DropReason::Disagrees { inliers, residual });
-    }
+    fits(view, tracked, truncation, OVERLAP)?;
     let departure = expected.map_or_else(Rigid::identity, |e| tracked.model_from_camera * e.inverse());
     let (shift, angle) = ((departure * Point3::origin()).coords.norm(), departure.rotation.angle());
     if shift > DEPARTURE || angle > DEPARTURE_ANGLE {
         return Err(DropReason::Departs { shift, angle });
+    }
+    Ok(())
+}
+
+/// Checks overlap, inliers and residual.
+///
+/// # Errors
+/// Why the pose cannot be trusted.
+pub(crate) fn fits(view: &DepthView, tracked: &Tracked, truncation: f32, min_overlap: f64) -> Result<(), DropReason> {
+    let Tracked { overlap, inliers, residual, .. } = *tracked;
+    if overlap < min_overlap {
+        return Err(DropReason::LittleOverlap { overlap });
+    }
+    if inliers < INLIERS || residual > residual_limit(view, residual, truncation) {
+        return Err(DropReason::Disagrees { inliers, residual });
     }
     Ok(())
 }
