@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use toile_capture::files::read_bytes;
+use toile_capture::files::{is_there, read_bytes};
 use toile_fitting::rigged_scan;
 use toile_garments::{Edits, Extraction, ExtractionReport, Take, Warning, extract};
 use toile_geometry::ply;
@@ -43,7 +43,7 @@ impl Cut<'_> {
 
     /// The layer's edits, where there are any.
     fn edits(&self) -> Option<PathBuf> {
-        Some(self.run.folders.edits(self.layer())).filter(|path| path.exists())
+        Some(self.run.folders.edits(self.layer())).filter(|path| is_there(path))
     }
 
     /// What is to be said of what was found.
