@@ -125,8 +125,7 @@ fn a_full_disk_while_processing_leaves_no_half_file_and_the_next_run_goes_on() {
     let (_dir, subject) = copy_of_olga();
     drop_trousers(&subject);
     let mut limited = Command::new("sh");
-    let words =
-        format!("ulimit -f 600; trap '' XFSZ; exec {} fuse {} --json", env!("CARGO_BIN_EXE_toile"), subject.display());
+    let words = format!("ulimit -f 600; exec {} fuse {} --json", env!("CARGO_BIN_EXE_toile"), subject.display());
     let answer = exits(1, limited.arg("-c").arg(words));
     let message = answer["error"]["message"].as_str().unwrap();
     assert!(message.contains("scan.ply") && message.contains("free some space"), "{message}");
