@@ -148,12 +148,12 @@ fn a_half_take_of_a_killed_capture_is_kept_by_an_import() {
 
 #[test]
 fn of_a_damaged_recording_everything_else_is_exported_and_a_full_disk_leaves_nothing() {
-    let recording = Recording::with_noise(8);
+    let recording = Recording::with_noise(20);
     exits(0, toile().args(recording.import("body")));
     let take = recording.subject().join("takes/00-body.mcap");
     let mut bytes = fs::read(&take).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle..middle + 64].fill(0x5a);
+    let late = bytes.len() * 3 / 4;
+    bytes[late..late + 64].fill(0x5a);
     let damaged = recording.folder().join("damaged.mcap");
     fs::write(&damaged, &bytes).unwrap();
     let plain = recording.folder().join("plain.mcap");

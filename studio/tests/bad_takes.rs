@@ -64,6 +64,20 @@ fn a_turn_that_is_not_full_is_a_warning() {
 }
 
 #[test]
+fn damaged_colour_is_counted_where_a_take_is_fused() {
+    let dir = tempfile::tempdir().unwrap();
+    let folders = dir.path().join("half");
+    let words = ["--as", "folders", "--garments", "", "--frames", "36", "--degrees", "220", "--seed", "6"];
+    exits(0, toile().arg("synthesize").arg("--out").arg(&folders).args(words));
+    let take = folders.join("00-body");
+    let picture = take.join("color/000003.jpg");
+    let whole = fs::read(&picture).unwrap();
+    fs::write(&picture, &whole[..whole.len() / 2]).unwrap();
+    let answer = exits(3, toile().arg("fuse").arg(&take).arg("--out").arg(dir.path().join("scan")));
+    assert!(answer["lost"].to_string().contains("1 frames have a damaged colour image"), "{answer}");
+}
+
+#[test]
 fn a_garment_take_that_shows_no_new_garment() {
     let (_dir, subject) = copy_of_olga();
     // The trousers take shows the body once more.

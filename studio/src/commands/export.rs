@@ -102,13 +102,13 @@ impl Export {
             return convert(&self.path, plain);
         }
         let copies = [(&self.glb, Model::Glb), (&self.vrm, Model::Vrm)];
-        for (copy, model) in copies {
-            copy.iter().try_for_each(|copy| check_model(copy, model, &self.path))?;
-        }
         if let (Some(glb), Some(vrm)) = (&self.glb, &self.vrm)
             && is_same_place(glb, vrm)
         {
             return Err(StudioError::Usage(format!("--glb and --vrm are the same file: {}", printable_path(glb))));
+        }
+        for (copy, model) in copies {
+            copy.iter().try_for_each(|copy| check_model(copy, model, &self.path))?;
         }
         let options = Options {
             motion: motion_choice(self.motion.as_deref()),
