@@ -97,7 +97,7 @@ fn times_of_frames_that_are_not_there_are_said() {
     assert!(
         said.len() == 1
             && said[0].contains("timestamps.txt")
-            && said[0].ends_with("2 frames of which there is no image: 3-4"),
+            && said[0].ends_with("of 2 frames there is a time, but no image: 3-4"),
         "{said:?}"
     );
 }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
-use toile_capture::files::{atomic_write, is_there, read_bytes};
+use toile_capture::files::{atomic_write, is_there, read_limited};
 use toile_character::JointNaming;
 use toile_garments::CullSettings;
 
@@ -87,7 +87,7 @@ impl AvatarChoice {
 /// Copies a motion into the subject's folder and gives its name there. Where another motion has that name already, the
 /// copy gets a number: `dance-2.bvh`.
 fn keep(folders: &Folders, path: &Path) -> Result<String, PipelineError> {
-    let bytes = read_bytes(path)?;
+    let bytes = read_limited(path, json::MAX_BYTES)?;
     let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
     let (stem, extension) = (text(path.file_stem()), text(path.extension()));
     let end = if extension.is_empty() { String::new() } else { format!(".{extension}") };
@@ -98,7 +98,7 @@ fn keep(folders: &Folders, path: &Path) -> Result<String, PipelineError> {
             atomic_write(&kept, &bytes)?;
             return Ok(name);
         }
-        if read_bytes(&kept).is_ok_and(|old| old == bytes) {
+        if read_limited(&kept, json::MAX_BYTES).is_ok_and(|old| old == bytes) {
             return Ok(name);
         }
     }

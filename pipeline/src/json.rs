@@ -8,8 +8,8 @@ use toile_capture::files::read_limited;
 
 use crate::PipelineError;
 
-/// The largest JSON file that is read, bytes.
-const MAX_BYTES: u64 = 256 << 20;
+/// The largest JSON file that is read, bytes; also of motions, which are text too.
+pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
 /// Reads a JSON file.
 ///

@@ -74,7 +74,7 @@ fn damaged_colour_is_counted_where_a_take_is_fused() {
     let whole = fs::read(&picture).unwrap();
     fs::write(&picture, &whole[..whole.len() / 2]).unwrap();
     let answer = exits(3, toile().arg("fuse").arg(&take).arg("--out").arg(dir.path().join("scan")));
-    assert!(answer["lost"].to_string().contains("1 frames have a damaged colour image"), "{answer}");
+    assert!(answer["lost"].to_string().contains("the colour image of 1 frames is damaged"), "{answer}");
 }
 
 #[test]

@@ -91,7 +91,9 @@ pub(super) fn read(path: &Path) -> Result<CameraFile, CaptureError> {
 }
 
 pub(super) fn parse(text: &str) -> Result<CameraFile, String> {
-    let Unique(value) = serde_json::from_str(text).map_err(|error| format!("is not readable JSON: {error}"))?;
+    let Unique(value) = serde_json::from_str(text).map_err(|error: serde_json::Error| {
+        if error.is_data() { error.to_string() } else { format!("is not readable JSON: {error}") }
+    })?;
     let object = value.as_object().ok_or("must be a JSON object with width, height, fx, fy, cx, cy")?;
     let depth = parse_camera(object, "")?;
     let depth_scale = optional_positive(object, "depth_scale")?;

@@ -123,7 +123,7 @@ fn missing_ends(path: &Path, numbers: &[u64], first: u64, lines: u64) -> Option<
     let missing: Vec<u64> = (first..low).chain(high + 1..first + lines).collect();
     let file = printable_path(&path.join("timestamps.txt"));
     let (count, list) = (missing.len(), number_list(&missing));
-    (count > 0).then(|| format!("{file}: has a time for {count} frames of which there is no image: {list}"))
+    (count > 0).then(|| format!("{file}: of {count} frames there is a time, but no image: {list}"))
 }
 
 /// Which frame number the first line of timestamps.txt belongs to; `None`: lines go by position.
@@ -185,7 +185,7 @@ mod tests {
         assert_eq!((said(&[0, 2, 3], 0, 4), said(&[2, 3], 2, 2)), (None, None));
         let both = said(&[2, 3], 0, 6).unwrap();
         assert!(
-            both.starts_with("x/timestamps.txt: ") && both.contains("4 frames") && both.ends_with("0-1, 4-5"),
+            both.starts_with("x/timestamps.txt: ") && both.contains("of 4 frames") && both.ends_with("0-1, 4-5"),
             "{both}"
         );
     }

@@ -76,7 +76,7 @@ impl Step for Fuse<'_> {
         let mut source = Looked { source, damaged: 0 };
         let scan = fuse(&mut source, self.settings, progress).map_err(wrong)?;
         if source.damaged > 0 {
-            lost.push(format!("{}: {} frames have a damaged colour image", self.name, source.damaged));
+            lost.push(format!("{}: the colour image of {} frames is damaged", self.name, source.damaged));
         }
         let mut warnings: Vec<String> = scan.report.warnings.iter().map(|w| format!("{}: {w}", self.name)).collect();
         if dropped > 0 {
