@@ -89,7 +89,7 @@ pub(crate) fn decode_jpeg(bytes: &[u8], strict: bool) -> Result<RgbImage, String
 
 /// True where a JPEG's markers follow each other as they should, up to its end marker; some cameras send padding behind
 /// that. Bits that were changed inside of a scan mostly look like markers that have no place there.
-fn has_sound_markers(bytes: &[u8]) -> bool {
+pub(crate) fn has_sound_markers(bytes: &[u8]) -> bool {
     let (mut rest, mut has_restarts) = (bytes.strip_prefix(&[0xff, 0xd8]).unwrap_or_default(), false);
     while let [0xff, marker, behind @ ..] = rest {
         match marker {
@@ -105,6 +105,26 @@ fn has_sound_markers(bytes: &[u8]) -> bool {
                 rest = if *marker == 0xda { behind_scan(following, has_restarts) } else { following };
             }
         }
+    }
+    false
+}
+
+/// True where a PNG's pieces follow each other with the right sums, up to the last one.
+pub(crate) fn has_sound_chunks(bytes: &[u8]) -> bool {
+    let mut rest = bytes.get(8..).unwrap_or_default();
+    while let Some((length, behind)) = rest.split_first_chunk::<4>() {
+        let length = u32::from_be_bytes(*length) as usize;
+        let Some((chunk, sum)) = length.checked_add(4).and_then(|length| behind.split_at_checked(length)) else {
+            return false;
+        };
+        let Some((sum, following)) = sum.split_first_chunk::<4>() else { return false };
+        if crc32fast::hash(chunk) != u32::from_be_bytes(*sum) {
+            return false;
+        }
+        if chunk.starts_with(b"IEND") {
+            return true;
+        }
+        rest = following;
     }
     false
 }

@@ -72,6 +72,15 @@ impl CaptureError {
         }
     }
 
+    /// What is wrong, without the file: for errors of others that name the file themselves.
+    pub fn reason(&self) -> String {
+        match self {
+            Self::Io { source, .. } => source.to_string(),
+            Self::Format { reason, .. } => reason.clone(),
+            other => other.to_string(),
+        }
+    }
+
     /// A format error at `path`.
     pub fn format(path: &std::path::Path, reason: impl Into<String>) -> Self {
         Self::Format { path: path.to_path_buf(), field: None, reason: reason.into() }

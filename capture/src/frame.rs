@@ -53,6 +53,15 @@ impl ColorImage {
         }
     }
 
+    /// True where its file ends as it should, seen from its markers alone and therefore fast; some damage is not seen.
+    pub fn is_sound(&self) -> bool {
+        match self {
+            Self::Rgb(_) => true,
+            Self::Jpeg(bytes) => encoded::has_sound_markers(bytes),
+            Self::Png(bytes) => encoded::has_sound_chunks(bytes),
+        }
+    }
+
     /// Decodes the whole image to see whether it is whole; gives its columns and rows.
     ///
     /// # Errors

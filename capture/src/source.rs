@@ -17,4 +17,9 @@ pub trait Source: Send {
     fn frame_count(&self) -> Option<u64> {
         None
     }
+
+    /// What is known to be missing besides frames between others, a sentence each (folders of images).
+    fn remarks(&self) -> Vec<String> {
+        Vec::new()
+    }
 }

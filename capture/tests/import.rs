@@ -68,9 +68,44 @@ fn an_unreadable_frame_is_left_out_and_named() {
 }
 
 #[test]
+fn a_colour_image_that_is_damaged_behind_its_header_is_counted_and_kept_as_it_came() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 4);
+    let path = folder.join("color/000002.jpg");
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() - 6]).unwrap();
+    let out = temp.path().join("take.mcap");
+    let report = import_to(&folder, &out).unwrap();
+    assert_eq!((report.frames, &report.damaged_color), (4, &vec![2]));
+    assert!(report.lost_data() && !report.is_complete(), "{report}");
+    assert!(report.to_string().contains("1 with a damaged colour image: 2"), "{report}");
+    let sound: Vec<bool> = all_frames(&mut Replay::open(&out).unwrap())
+        .unwrap()
+        .iter()
+        .map(|f| f.color.as_ref().unwrap().is_sound())
+        .collect();
+    assert_eq!(sound, [true, true, false, true]);
+}
+
+#[test]
+fn times_of_frames_that_are_not_there_are_said() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = image_folder(&temp.path().join("take"), 3);
+    assert!(import::open(&folder, None).unwrap().remarks().is_empty());
+    fs::write(folder.join("timestamps.txt"), "1\n2\n3\n4\n5\n").unwrap();
+    let said = import::open(&folder, None).unwrap().remarks();
+    assert!(
+        said.len() == 1
+            && said[0].contains("timestamps.txt")
+            && said[0].ends_with("of 2 frames there is a time, but no image: 3-4"),
+        "{said:?}"
+    );
+}
+
+#[test]
 fn bad_folders_get_one_clear_sentence() {
     type Damage = fn(&Path);
-    let cases: [(&str, Damage); 13] = [
+    let cases: [(&str, Damage); 14] = [
         ("camera.json: is missing", |f| fs::remove_file(f.join("camera.json")).unwrap()),
         ("field `fx` is missing", |f| edit(f, "\"fx\"", "\"focal\"")),
         ("field `width` must be a number", |f| edit(f, "24", "\"24\"")),
@@ -81,6 +116,9 @@ fn bad_folders_get_one_clear_sentence() {
             fs::write(f.join("timestamps.txt"), "1\n2\n").unwrap();
         }),
         ("line 2 is not a time", |f| fs::write(f.join("timestamps.txt"), "1\nx\n3\n").unwrap()),
+        ("timestamps.txt: line 1: the time -7 ns is before 0", |f| {
+            fs::write(f.join("timestamps.txt"), "-7\n5\n9\n").unwrap();
+        }),
         ("line 3 is earlier", |f| fs::write(f.join("timestamps.txt"), "1\n5\n4\n").unwrap()),
         ("2 of 3 frames have the same time", |f| fs::write(f.join("timestamps.txt"), "5\n5\n5\n").unwrap()),
         ("must be a 16-bit grey PNG", |f| {

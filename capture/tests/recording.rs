@@ -232,6 +232,18 @@ fn an_unfinished_recording_stays_as_part_and_is_readable() {
 }
 
 #[test]
+fn a_recording_that_can_be_made_again_leaves_nothing_where_it_is_not_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("take.mcap");
+    let rig = rig(1);
+    for (replace_part, left) in [(false, 1), (true, 0)] {
+        let options = RecorderOptions { replace_part, ..plain() };
+        drop(Recorder::create(&path, &rig, options).unwrap());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), left);
+    }
+}
+
+#[test]
 fn a_power_cut_while_recording_leaves_whole_chunks() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("take.mcap");

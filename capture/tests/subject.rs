@@ -259,3 +259,40 @@ fn real_subject_imports_and_is_healthy() {
     assert!(report.healthy, "{report}");
     assert_eq!(report.takes[1].frames, 100);
 }
+
+#[test]
+fn fields_that_are_not_known_and_comments_are_kept_and_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path().join("anna");
+    let mut subject = LockedSubject::create(&folder).unwrap();
+    add(&mut subject, "body", 1);
+    drop(subject);
+    let file = folder.join("subject.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    let text = text.replacen("name = ", "# our own numbers\nstudio = 7 # cellar\nname = ", 1);
+    fs::write(&file, format!("{text}tpye = \"top\"\n")).unwrap();
+    let mut subject = LockedSubject::open(&folder).unwrap();
+    subject.set_rig("kinect1").unwrap();
+    let said = subject.remarks();
+    assert!(said.len() == 2 && said[0].contains("`studio`") && said[1].contains("`tpye` of layer 00-body"), "{said:?}");
+    let text = fs::read_to_string(&file).unwrap();
+    for part in ["# our own numbers\nstudio = 7 # cellar\n", "tpye = \"top\"", "rig = \"kinect1\""] {
+        assert!(text.contains(part), "{text}");
+    }
+    assert_eq!(toile_capture::Subject::open(&folder).unwrap().rig(), "kinect1");
+}
+
+#[test]
+fn a_half_take_that_a_killed_capture_left_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path().join("anna");
+    let mut subject = LockedSubject::create(&folder).unwrap();
+    add(&mut subject, "body", 1);
+    assert!(subject.remarks().is_empty());
+    for name in ["01-top.mcap.part", "00-body.retake.mcap.part.2", "notes.part"] {
+        fs::write(folder.join("takes").join(name), "half").unwrap();
+    }
+    let said = subject.remarks();
+    assert!(said.len() == 2 && said[0].contains("00-body.retake.mcap.part.2"), "{said:?}");
+    assert!(said[1].contains("01-top.mcap.part") && said[1].contains("toile import"), "{said:?}");
+}

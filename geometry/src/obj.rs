@@ -8,6 +8,10 @@ use crate::{GeometryError, Mesh, file::read_limited};
 
 /// Maximum size of a file, bytes: text is some three times as long as the same mesh in PLY.
 const MAX_BYTES: u64 = 1 << 30;
+/// Maximum number of corners of a face: a fan over more of them is no surface, but thin triangles all at one vertex.
+const MAX_CORNERS: usize = 1000;
+/// At most this many characters of a line are shown.
+const SHOWN: usize = 60;
 
 /// Reads positions, faces and vertex colours (three numbers from 0 to 1 behind the position, as MeshLab writes them) of an
 /// OBJ file; materials, texture coordinates and normals are left out.
@@ -26,7 +30,15 @@ pub fn decode(bytes: &[u8]) -> Result<Mesh, String> {
     let text = String::from_utf8_lossy(bytes);
     let mut mesh = Mesh::default();
     for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-        read_line(line, &mut mesh).ok_or_else(|| format!("line {}: cannot read \"{line}\"", number + 1))?;
+        read_line(line, &mut mesh).ok_or_else(|| {
+            let corners = line.split_whitespace().count().saturating_sub(1);
+            if line.trim_start().starts_with("f ") && corners > MAX_CORNERS {
+                return format!("line {}: a face has {corners} corners; cut faces into triangles", number + 1);
+            }
+            let shown: String = line.chars().take(SHOWN).collect();
+            let more = if shown.len() < line.len() { "..." } else { "" };
+            format!("line {}: cannot read \"{shown}{more}\"", number + 1)
+        })?;
     }
     if mesh.colors.len() != mesh.positions.len() {
         mesh.colors.clear(); // not every vertex has one
@@ -46,8 +58,9 @@ fn read_line(line: &str, mesh: &mut Mesh) -> Option<()> {
             }
         }
         Some("f") => {
-            let face: Vec<u32> = words.map(|w| vertex_index(w, mesh.positions.len())).collect::<Option<_>>()?;
-            let fan = 1..face.len().checked_sub(1).filter(|&last| last >= 2)?;
+            let face: Vec<u32> =
+                words.take(MAX_CORNERS + 1).map(|w| vertex_index(w, mesh.positions.len())).collect::<Option<_>>()?;
+            let fan = 1..face.len().checked_sub(1).filter(|last| (2..MAX_CORNERS).contains(last))?;
             mesh.triangles.extend(fan.map(|i| [face[0], face[i], face[i + 1]]));
         }
         _ => {}
@@ -96,6 +109,10 @@ mod tests {
         for wrong in ["v 1 2", "v 1 x 2", "f 1 2", "f 0 1 2", "f -9 1 2", "f 1 2 99999999999999999999"] {
             assert!(complaint(wrong).contains("line 4"), "{wrong}");
         }
+        let face = |corners: usize| format!("f{}", " 1 2 3".repeat(corners / 3));
+        assert!(complaint(&face(3000)).contains("line 4: a face has 3000 corners"));
+        assert!(decode(format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", face(999)).as_bytes()).is_ok());
+        assert!(complaint(&format!("v {}", "x".repeat(1 << 20))).len() < 200, "a long line is not shown whole");
         assert!(complaint("f 1 2 4").contains("triangle 0"));
         assert!(complaint("v nan 0 0").contains("vertex 3"));
         assert!(decode(b"# M\xfcller\nv 0 0 0\n").is_ok());

@@ -5,7 +5,7 @@ use std::{
     str::FromStr,
 };
 
-use toile_capture::{CaptureError, Layer, Replay, Source, Subject};
+use toile_capture::{Layer, Replay, Source, Subject, files::read_text};
 use toile_driver_kinect1::{self as kinect1, Kinect1};
 use toile_driver_kinect2::{self as kinect2, Kinect2};
 use toile_driver_realsense::{self as realsense, Realsense};
@@ -123,7 +123,7 @@ impl Device {
 
 /// Settings of a stereo rig (TOML); files that they name are looked for beside them.
 fn stereo_settings(file: &Path) -> Result<StereoSettings, LiveError> {
-    let text = std::fs::read_to_string(file).map_err(|e| CaptureError::io(file, e))?;
+    let text = read_text(file)?;
     let wrong = |e: toml::de::Error| LiveError::settings(file, e.message());
     let mut settings: StereoSettings = toml::from_str(&text).map_err(wrong)?;
     let beside = file.parent().unwrap_or(Path::new(""));

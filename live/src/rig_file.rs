@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use toile_capture::{CaptureError, Layer, Source, Subject};
+use toile_capture::{Layer, Source, Subject, files::read_text};
 use toile_geometry::Rigid;
 
 use crate::{LiveError, color::Color, device::Device, stop::Pace, together::Together};
@@ -53,7 +53,7 @@ impl RigFile {
     /// # Errors
     /// [`LiveError`] names the file and what is wrong with it.
     pub fn read(path: &Path) -> Result<Self, LiveError> {
-        let text = std::fs::read_to_string(path).map_err(|e| CaptureError::io(path, e))?;
+        let text = read_text(path)?;
         let sensors = parse(&text).map_err(|e| LiveError::settings(path, e))?;
         Ok(Self { path: path.to_path_buf(), sensors })
     }
@@ -127,6 +127,20 @@ mod tests {
         );
         let seen = sensors[1].rig_from_depth * nalgebra::Point3::new(0.5, 0.0, 1.0);
         assert!((seen - nalgebra::Point3::new(-0.5, 0.0, 3.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_pipe_is_refused_without_waiting() {
+        let dir = tempfile::tempdir().unwrap();
+        let pipe = dir.path().join("rig.toml");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let told = RigFile::read(&pipe).unwrap_err().to_string();
+        assert!(told.contains("not a regular file"), "{told}");
+        let device = Device::Stereo(pipe.clone());
+        let subject = toile_capture::LockedSubject::create(&dir.path().join("anna")).unwrap();
+        let layer = subject.next_take("body", None).unwrap().layer;
+        let told = device.open(&subject, &layer).err().unwrap().to_string();
+        assert!(told.contains("not a regular file"), "{told}");
     }
 
     #[test]

@@ -2,12 +2,12 @@
 //! run makes the same one.
 
 use std::{
-    fs,
+    ffi::OsStr,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
-use toile_capture::files::{atomic_write, read_bytes};
+use toile_capture::files::{atomic_write, is_there, read_limited};
 use toile_character::JointNaming;
 use toile_garments::CullSettings;
 
@@ -37,7 +37,7 @@ impl AvatarChoice {
     /// [`PipelineError`] where the file cannot be read.
     pub fn read(folders: &Folders) -> Result<Self, PipelineError> {
         let path = folders.avatar_choice();
-        if path.exists() { json::read(&path) } else { Ok(Self::default()) }
+        if is_there(&path) { json::read(&path) } else { Ok(Self::default()) }
     }
 
     /// Its choices now: as before where `options` say nothing. A motion is copied into the subject's folder.
@@ -84,21 +84,56 @@ impl AvatarChoice {
     }
 }
 
-/// Copies a motion into the subject's folder and gives its name there.
+/// Copies a motion into the subject's folder and gives its name there. Where another motion has that name already, the
+/// copy gets a number: `dance-2.bvh`.
 fn keep(folders: &Folders, path: &Path) -> Result<String, PipelineError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let kept = folders.motions().join(&name);
-    let bytes = read_bytes(path)?;
-    if fs::read(&kept).is_ok_and(|old| old == bytes) {
-        return Ok(name);
+    let bytes = read_limited(path, json::MAX_BYTES)?;
+    let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    let (stem, extension) = (text(path.file_stem()), text(path.extension()));
+    let end = if extension.is_empty() { String::new() } else { format!(".{extension}") };
+    let names = (1_u32..).map(|n| if n == 1 { format!("{stem}{end}") } else { format!("{stem}-{n}{end}") });
+    for name in names {
+        let kept = folders.motions().join(&name);
+        if !is_there(&kept) {
+            atomic_write(&kept, &bytes)?;
+            return Ok(name);
+        }
+        if read_limited(&kept, json::MAX_BYTES).is_ok_and(|old| old == bytes) {
+            return Ok(name);
+        }
     }
-    atomic_write(&kept, &bytes)?;
-    Ok(name)
+    Err(PipelineError::refused(path, "there is no free name left for it in the subject's edits/motion"))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
+
+    #[test]
+    fn a_motion_never_replaces_another_one_of_its_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let (folders, bvh) = (Folders::new(&dir.path().join("anna")), dir.path().join("dance.bvh"));
+        let choose = |content: &str| {
+            fs::write(&bvh, content).unwrap();
+            let options = Options { motion: MotionChoice::File(bvh.clone()), ..Options::default() };
+            AvatarChoice::choose(&folders, &options).unwrap().motion.unwrap()
+        };
+        assert_eq!(
+            [choose("a"), choose("b"), choose("a"), choose("b")],
+            ["dance.bvh", "dance-2.bvh", "dance.bvh", "dance-2.bvh"]
+        );
+        let at = |name: &str| folders.motions().join(name);
+        assert_eq!(fs::read_to_string(at("dance.bvh")).unwrap(), "a");
+        // What could block for ever is no motion, and is not waited for.
+        fs::remove_file(at("dance.bvh")).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", at("dance.bvh")).unwrap();
+        assert_eq!(choose("c"), "dance-3.bvh");
+        fs::remove_file(folders.avatar_choice()).unwrap();
+        std::os::unix::fs::symlink("gone", folders.avatar_choice()).unwrap();
+        assert!(AvatarChoice::read(&folders).unwrap_err().to_string().contains("avatar.json"));
+    }
 
     #[test]
     fn a_choice_is_kept_until_another_one_is_made() {

@@ -48,7 +48,7 @@ pub enum PipelineError {
         source: Cause,
     },
     /// Another run holds the subject.
-    #[error("{path}: another toile works on this subject; wait for it to end")]
+    #[error("{path}: another toile is writing here; wait until it has ended and run the command again")]
     Busy {
         /// The subject's folder.
         path: PathBuf,

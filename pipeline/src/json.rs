@@ -4,16 +4,19 @@ use std::path::Path;
 
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value;
-use toile_capture::files::read_bytes;
+use toile_capture::files::read_limited;
 
 use crate::PipelineError;
+
+/// The largest JSON file that is read, bytes; also of motions, which are text too.
+pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
 /// Reads a JSON file.
 ///
 /// # Errors
 /// [`PipelineError`] where it is missing, or names the field that is not what it should be.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, PipelineError> {
-    from_slice(path, &read_bytes(path)?)
+    from_slice(path, &read_limited(path, MAX_BYTES)?)
 }
 
 /// The content of the file `path`.

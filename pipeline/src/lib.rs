@@ -48,7 +48,7 @@ pub use observer::{Observer, Silent};
 pub use opened::Opened;
 pub use options::{FusionChoice, Goal, HiddenChoice, MotionChoice, Options};
 pub use process::process;
-pub use record::Record;
+pub use record::{Record, steps_in};
 pub use resume::run_step;
 pub use run::Run;
 pub use settings::Settings;

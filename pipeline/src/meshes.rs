@@ -1,12 +1,15 @@
 //! Meshes as files: any mesh, and meshes with their skin weights as vertex attributes.
 
-use std::path::Path;
+use std::{io::Read, path::Path};
 
+use toile_capture::files::open_regular;
 use toile_character::{SkinWeights, skin::INFLUENCES};
 use toile_geometry::{Mesh, obj, ply};
 
 use crate::PipelineError;
 
+/// The largest mesh file that is read, bytes.
+const MAX_BYTES: u64 = 1 << 30;
 const JOINT: [&str; INFLUENCES] = ["joint0", "joint1", "joint2", "joint3"];
 const WEIGHT: [&str; INFLUENCES] = ["weight0", "weight1", "weight2", "weight3"];
 
@@ -15,8 +18,34 @@ const WEIGHT: [&str; INFLUENCES] = ["weight0", "weight1", "weight2", "weight3"];
 /// # Errors
 /// [`PipelineError`] where the file is missing or is not a mesh.
 pub fn read_mesh(path: &Path) -> Result<Mesh, PipelineError> {
-    let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-    Ok(if is_obj { obj::read(path)? } else { ply::read(path)? })
+    Ok(if is_obj(path) { obj::read(path)? } else { ply::read(path)? })
+}
+
+/// Looks at the size of a mesh file and at its first bytes, before anybody reads all of it.
+///
+/// # Errors
+/// [`PipelineError`] where it is missing or is no file of a mesh.
+pub(crate) fn check_kind(path: &Path) -> Result<(), PipelineError> {
+    let wrap = |e| PipelineError::io(path, e);
+    let file = open_regular(path)?;
+    let length = file.metadata().map_err(wrap)?.len();
+    if length > MAX_BYTES {
+        let reason = format!("holds {length} bytes; a mesh of at most {} MiB can be read", MAX_BYTES >> 20);
+        return Err(PipelineError::format(path, reason));
+    }
+    let mut head = Vec::new();
+    file.take(3).read_to_end(&mut head).map_err(wrap)?;
+    if is_obj(path) || head == b"ply" {
+        return Ok(());
+    }
+    Err(PipelineError::format(
+        path,
+        "is not a PLY file: it does not start with `ply` (an OBJ file must be called .obj)",
+    ))
+}
+
+fn is_obj(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"))
 }
 
 /// Reads a mesh that [`encode_skinned`] wrote.

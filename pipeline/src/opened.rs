@@ -26,7 +26,8 @@ impl Opened {
     /// [`PipelineError`] that names the file or field that is missing or wrong.
     pub fn new(recording: &Path, format: Option<Format>) -> Result<Self, PipelineError> {
         if !recording.is_file() || format.is_some_and(|f| f != Format::Mcap) {
-            return Ok(Self { source: import::open(recording, format)?, lost: Vec::new(), dropped: 0 });
+            let source = import::open(recording, format)?;
+            return Ok(Self { lost: source.remarks(), source, dropped: 0 });
         }
         let replay = Replay::open(recording)?;
         let lost = replay.lost().map(|l| format!("{}: {l}", recording.display())).into_iter().collect();

@@ -2,6 +2,7 @@
 
 use std::{fs, path::Path};
 
+use toile_capture::printable_path;
 use toile_character::BodyModel;
 
 use crate::{
@@ -10,7 +11,7 @@ use crate::{
     body_file::{Body, BodyFile},
     garment::{self, Garment},
     json,
-    options::{Goal, Options},
+    options::{Goal, MotionChoice, Options},
     settings, stale,
     step::Step,
     steps::{cut::Cut, export::Export, fit::Fit, fuse::Fuse, page::Page, pose::PoseUnder, stack::Stack},
@@ -39,6 +40,7 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
         to_body(&run, goal, options, &mut summary)?;
     }
     summary.notes.extend(stale::note(&run.folders, goal));
+    summary.notes.extend(run.remarks());
     Ok(summary)
 }
 
@@ -93,6 +95,12 @@ fn deliver(
     let folders = &run.folders;
     let before = AvatarChoice::read(folders)?;
     let choice = AvatarChoice::choose(folders, options)?;
+    if let (MotionChoice::File(given), Some(kept)) = (&options.motion, &choice.motion)
+        && given.file_name().is_some_and(|name| name.to_string_lossy() != *kept)
+    {
+        let name = printable_path(given);
+        summary.notes.push(format!("{name} is kept as edits/motion/{kept}: another motion has its name there already"));
+    }
     if choice == before {
         summary.notes.extend(choice.in_words().into_iter().map(|what| format!("the avatar keeps {what}")));
     }

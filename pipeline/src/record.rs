@@ -7,7 +7,7 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
-use toile_capture::files::atomic_write;
+use toile_capture::files::{atomic_write, is_there};
 
 use crate::{PipelineError, hash, json};
 
@@ -70,6 +70,13 @@ pub fn read<R: DeserializeOwned>(folder: &Path, step: &str) -> Result<Option<Rec
     json::from_value(&path, &format!("stages.{step}"), record).map(Some)
 }
 
+/// Which steps worked in `folder` and left a record that was not changed since.
+pub fn steps_in(folder: &Path) -> Vec<String> {
+    let stages = read_file(&report_path(folder)).unwrap_or_default().stages;
+    let is_whole = |stage: &Sealed| stage.seal.as_ref().is_some_and(|seal| seal_of(&stage.record) == *seal);
+    stages.into_iter().filter(|(_, stage)| is_whole(stage)).map(|(step, _)| step).collect()
+}
+
 /// Puts the record of `step` into the file of `folder`, beside those of other steps.
 ///
 /// # Errors
@@ -91,7 +98,7 @@ pub fn write<R: Serialize + DeserializeOwned>(
 }
 
 fn read_file(path: &Path) -> Result<ReportFile, PipelineError> {
-    if path.exists() { json::read(path) } else { Ok(ReportFile::default()) }
+    if is_there(path) { json::read(path) } else { Ok(ReportFile::default()) }
 }
 
 fn seal_of(record: &Value) -> String {

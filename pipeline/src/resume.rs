@@ -15,6 +15,8 @@ use crate::{
     step::{Product, Step},
 };
 
+/// How long each step of a folder took.
+const TIMINGS: &str = "timings.json";
 /// Part of every record's hash: a new program version builds again.
 const PROGRAM: &str = concat!("toile ", env!("CARGO_PKG_VERSION"));
 
@@ -38,7 +40,11 @@ pub fn run_step<S: Step>(step: &S, root: &Path, observer: &dyn Observer) -> Resu
         Err(error) => observer.remark(&format!("{error}; {label} runs again")),
     }
     observer.begin(&label, step.seconds());
-    let Product { files, report, remarks, timings } = step.work(&|fraction| observer.at(fraction))?;
+    let Product { files, report, remarks, mut timings } = step.work(&|fraction| observer.at(fraction))?;
+    if S::OUTPUTS_VARY {
+        let written = files.iter().map(|(path, bytes)| (relative(root, path), hash::bytes(bytes)));
+        timings = json!({ "outputs": written.collect::<BTreeMap<_, _>>() });
+    }
     let hash_of_output = |bytes: &[u8]| if S::OUTPUTS_VARY { String::new() } else { hash::bytes(bytes) };
     let record = Record {
         version: S::VERSION,
@@ -77,16 +83,23 @@ fn relative(root: &Path, path: &Path) -> String {
 
 fn is_intact<S: Step>(step: &S, root: &Path, record: &Record<S::Report>) -> bool {
     let outputs = step.outputs();
-    if S::OUTPUTS_VARY {
-        return outputs.iter().all(|path| path.is_file());
-    }
-    hashes(root, &outputs).is_ok_and(|now| now == record.outputs)
+    let written = if S::OUTPUTS_VARY { varied(&step.folder(), S::NAME) } else { Some(record.outputs.clone()) };
+    written.is_some_and(|written| hashes(root, &outputs).is_ok_and(|now| now == written))
+}
+
+/// What a step whose outputs contain times wrote: its hashes stand beside its own times, since `report.json` is the same
+/// from run to run.
+fn varied(folder: &Path, step: &str) -> Option<BTreeMap<String, String>> {
+    serde_json::from_value(read_timings(folder).get(step)?.get("outputs")?.clone()).ok()
+}
+
+/// Times that cannot be read are of no use to anybody: they start anew.
+fn read_timings(folder: &Path) -> BTreeMap<String, Value> {
+    json::read(&folder.join(TIMINGS)).unwrap_or_default()
 }
 
 fn write_timings(folder: &Path, step: &str, detail: Value, started: Instant) -> Result<(), PipelineError> {
-    let path = folder.join("timings.json");
-    // Times that cannot be read are of no use to anybody: they start anew.
-    let mut all: BTreeMap<String, Value> = json::read(&path).unwrap_or_default();
+    let mut all = read_timings(folder);
     let mut mine = json!({
         "seconds": (started.elapsed().as_secs_f64() * 1e3).round() / 1e3,
         "peak_memory_bytes": memory::peak_bytes(),
@@ -96,7 +109,7 @@ fn write_timings(folder: &Path, step: &str, detail: Value, started: Instant) -> 
         mine.extend(detail);
     }
     all.insert(step.into(), mine);
-    Ok(atomic_write(&path, &json::pretty(&all)?)?)
+    Ok(atomic_write(&folder.join(TIMINGS), &json::pretty(&all)?)?)
 }
 
 #[cfg(test)]
@@ -114,13 +127,13 @@ mod tests {
     }
 
     /// Copies a file, and counts how often it did.
-    struct Copy {
+    struct Copy<const VARIES: bool = false> {
         dir: tempfile::TempDir,
         runs: Cell<u32>,
         setting: Cell<u32>,
     }
 
-    impl Copy {
+    impl<const VARIES: bool> Copy<VARIES> {
         fn new() -> Self {
             let dir = tempfile::tempdir().unwrap();
             fs::write(dir.path().join("in"), b"take").unwrap();
@@ -138,11 +151,12 @@ mod tests {
         }
     }
 
-    impl Step for Copy {
+    impl<const VARIES: bool> Step for Copy<VARIES> {
         type Report = Counted;
         const NAME: &'static str = "copy";
         const VERSION: u32 = 1;
         const SECONDS: f64 = 1.0;
+        const OUTPUTS_VARY: bool = VARIES;
 
         fn label(&self) -> String {
             "a copy".into()
@@ -173,14 +187,14 @@ mod tests {
 
     #[test]
     fn the_same_is_not_done_twice() {
-        let copy = Copy::new();
+        let copy: Copy = Copy::new();
         assert_eq!([copy.run(), copy.run()], [1, 1]);
         assert_eq!(fs::read(copy.at("build/out")).unwrap(), b"take");
     }
 
     #[test]
     fn other_input_settings_or_a_damaged_output_is_done_again() {
-        let copy = Copy::new();
+        let copy: Copy = Copy::new();
         copy.run();
         copy.setting.set(2);
         assert_eq!(copy.run(), 2);
@@ -192,8 +206,27 @@ mod tests {
     }
 
     #[test]
+    fn an_output_that_varies_is_made_again_once_it_is_altered_emptied_or_gone() {
+        let copy: Copy<true> = Copy::new();
+        assert_eq!([copy.run(), copy.run()], [1, 1]);
+        let record = fs::read_to_string(copy.at("build/report.json")).unwrap();
+        for (runs, content) in (2..).zip(["altered", ""]) {
+            fs::write(copy.at("build/out"), content).unwrap();
+            assert_eq!([copy.run(), copy.run()], [runs; 2]);
+        }
+        fs::remove_file(copy.at("build/out")).unwrap();
+        assert_eq!([copy.run(), copy.run()], [4, 4]);
+        assert_eq!(fs::read(copy.at("build/out")).unwrap(), b"take");
+        assert_eq!(
+            fs::read_to_string(copy.at("build/report.json")).unwrap(),
+            record,
+            "it holds no hash of what varies"
+        );
+    }
+
+    #[test]
     fn a_record_that_was_changed_is_named_and_its_step_runs_again() {
-        let copy = Copy::new();
+        let copy: Copy = Copy::new();
         copy.run();
         let path = copy.at("build/report.json");
         let whole = fs::read_to_string(&path).unwrap();
@@ -209,7 +242,7 @@ mod tests {
 
     #[test]
     fn an_error_leaves_no_record() {
-        let copy = Copy::new();
+        let copy: Copy = Copy::new();
         fs::remove_file(copy.at("in")).unwrap();
         assert!(run_step(&copy, copy.dir.path(), &Silent).is_err());
         assert!(!copy.at("build").exists());
@@ -217,7 +250,7 @@ mod tests {
 
     #[test]
     fn records_of_other_steps_in_the_folder_stay() {
-        let copy = Copy::new();
+        let copy: Copy = Copy::new();
         copy.run();
         let record = record::read::<Counted>(&copy.at("build"), "copy").unwrap().unwrap();
         record::write(&copy.at("build"), PROGRAM, "other", &record).unwrap();

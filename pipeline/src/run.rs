@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use toile_capture::{LockedSubject, subject::Layer};
+use toile_capture::{LockedSubject, printable, subject::Layer};
 use toile_garments::GarmentType;
 
 use crate::{Observer, PipelineError, Record, Settings, folders::Folders, resume::run_step, step::Step};
@@ -78,7 +78,14 @@ impl<'a> Run<'a> {
 
     /// The name of a step while it runs.
     pub fn label(&self, layer: &str, stage: &str) -> String {
-        if self.name == layer { format!("{layer}: {stage}") } else { format!("{} {layer}: {stage}", self.name) }
+        // Names come from outside: nothing in them may steer the terminal that this is shown on.
+        let name = printable(&self.name);
+        if self.name == layer { format!("{name}: {stage}") } else { format!("{name} {}: {stage}", printable(layer)) }
+    }
+
+    /// What the operator should know of the subject's folder itself, a sentence each.
+    pub fn remarks(&self) -> Vec<String> {
+        self.subject.as_ref().map_or_else(Vec::new, |subject| subject.remarks())
     }
 
     /// Folder name of the body take.
@@ -119,4 +126,21 @@ fn garment_types(root: &Path, layers: &[Layer]) -> Result<Vec<Option<GarmentType
         Ok(stated.or_else(|| GarmentType::from_layer_name(&layer.name)).filter(|_| n > 0))
     };
     layers.iter().enumerate().map(of_layer).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observer::Silent;
+
+    #[test]
+    fn names_are_shown_without_what_steers_a_terminal() {
+        for name in ["a\u{1b}[2Jb", "a\nb", "a\u{202e}b"] {
+            let run = Run::single(Path::new("."), name, Settings::default(), &Silent);
+            for layer in [name, "00-body"] {
+                let label = run.label(layer, "fuse");
+                assert!(label.contains("\\u{") && !label.contains(['\u{1b}', '\n', '\u{202e}']), "{label}");
+            }
+        }
+    }
 }

@@ -22,7 +22,7 @@ pub trait Step {
     const VERSION: u32;
     /// Expected seconds of one run, for the time that is left.
     const SECONDS: f64;
-    /// True where the outputs contain times and so differ from run to run: the record then has no hash of them.
+    /// True where the outputs contain times and so differ from run to run: the record then has no hash of them, but `timings.json`.
     const OUTPUTS_VARY: bool = false;
 
     /// The name of the step while it runs.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Translation3, UnitQuaternion, Vector3};
+use toile_capture::files::read_text;
 use toile_geometry::Rigid;
 
 use crate::{
@@ -50,7 +51,7 @@ pub fn read_calibration<P: AsRef<Path>>(paths: &[P], metres_per_unit: f64) -> Re
     let mut all = FileStorage::default();
     for path in paths {
         let name = path.as_ref().display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|e| wrong(&name, e.to_string()))?;
+        let text = read_text(path.as_ref()).map_err(|e| wrong(&name, e.reason()))?;
         let part = file_storage::parse(&text).map_err(|e| wrong(&name, e))?;
         all.matrices.extend(part.matrices);
         all.numbers.extend(part.numbers);
@@ -160,6 +161,12 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn what_is_no_regular_file_is_refused_without_waiting() {
+        let told = read_calibration(&["/dev/null"], 1.0).unwrap_err().to_string();
+        assert!(told.contains("not a regular file"), "{told}");
+    }
 
     pub(super) fn matrix_text(name: &str, rows: usize, data: &[f64]) -> String {
         let list: Vec<String> = data.iter().map(|x| format!("{x:e}")).collect();

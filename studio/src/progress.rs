@@ -7,6 +7,7 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
+use toile_capture::printable;
 use toile_live::Status;
 use toile_pipeline::Observer;
 
@@ -126,7 +127,7 @@ impl Observer for Progress {
 
     fn begin(&self, label: &str, cost: f64) {
         let mut state = self.state();
-        (state.label, state.step, state.fraction) = (label.to_string(), cost, 0.0);
+        (state.label, state.step, state.fraction) = (printable(label).into_owned(), cost, 0.0);
         state.ahead = state.ahead.max(cost);
         self.show(&mut state, true);
     }
@@ -179,6 +180,13 @@ mod tests {
         assert_eq!(time_left(100.0, 1.0, 4.0), "about 5 min left");
         assert_eq!(time_left(0.5, 1.0, 4.0), "");
         assert_eq!(time_left(10.0, 0.0, 4.0), "");
+    }
+
+    #[test]
+    fn a_label_cannot_steer_the_terminal() {
+        let progress = Progress::new(true);
+        progress.begin("a\u{1b}[2J\nb\u{202e}: fuse", 1.0);
+        assert_eq!(progress.state().label, "a\\u{1b}[2J\\u{a}b\\u{202e}: fuse");
     }
 
     #[test]

@@ -3,10 +3,11 @@
 use std::{
     ffi::OsString,
     io::{self, IsTerminal, Write},
-    sync::Arc,
+    sync::{Arc, atomic::AtomicBool},
 };
 
 use clap::{CommandFactory, Parser, error::ErrorKind};
+use signal_hook::{consts::SIGXFSZ, flag};
 use toile_capture::{printable, printable_lines};
 use toile_pipeline::json;
 use tracing_subscriber::{EnvFilter, fmt::MakeWriter};
@@ -29,6 +30,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Outcome {
         Ok(cli) => cli,
         Err(error) => return not_understood(&error, words.iter().any(|w| w == "--json")),
     };
+    heed_file_limits();
     let session = Session { progress: Arc::new(Progress::new(cli.globals.quiet)), globals: cli.globals };
     start_log(&session);
     let mut answer = start_threads(session.globals.threads).and_then(|()| cli.command.run(&session));
@@ -38,6 +40,12 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Outcome {
     }
     print(cli.command.name(), &answer, &session.globals);
     Outcome::of(&answer)
+}
+
+/// A limit on the size of files ends the program unless the signal is caught: then writing fails, as on a full disk.
+fn heed_file_limits() {
+    // Where it cannot be caught, the system's own way stays.
+    drop(flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false))));
 }
 
 impl Command {

@@ -133,15 +133,55 @@ fn a_layer_is_not_overwritten_but_retaken() {
 }
 
 #[test]
+fn a_half_take_of_a_killed_capture_is_kept_by_an_import() {
+    let recording = Recording::new(3, 3);
+    exits(0, toile().args(recording.import("body")));
+    let takes = recording.subject().join("takes");
+    let part = takes.join("00-body.retake.mcap.part");
+    fs::write(&part, "what a killed capture left").unwrap();
+    let told = exits(0, toile().arg("inspect").arg(recording.subject()));
+    assert!(told["warnings"].to_string().contains("00-body.retake.mcap.part"), "{told}");
+    let told = exits(0, toile().args(recording.import("body")).arg("--retake"));
+    let kept = takes.join("00-body.retake.mcap.part.1");
+    assert_eq!(fs::read_to_string(&kept).unwrap(), "what a killed capture left");
+    assert!(told["warnings"].to_string().contains("00-body.retake.mcap.part.1"), "{told}");
+    assert!(!part.exists());
+}
+
+#[test]
+fn of_a_damaged_recording_everything_else_is_exported_and_a_full_disk_leaves_nothing() {
+    let recording = Recording::with_noise(20);
+    exits(0, toile().args(recording.import("body")));
+    let take = recording.subject().join("takes/00-body.mcap");
+    let mut bytes = fs::read(&take).unwrap();
+    let late = bytes.len() * 3 / 4;
+    bytes[late..late + 64].fill(0x5a);
+    let damaged = recording.folder().join("damaged.mcap");
+    fs::write(&damaged, &bytes).unwrap();
+    let plain = recording.folder().join("plain.mcap");
+    let told = exits(3, toile().arg("export").arg(&damaged).arg("--mcap").arg(&plain));
+    assert!(told["lost"][0].as_str().unwrap().contains("damaged.mcap"), "{told}");
+    assert!(told["results"]["frames"].as_u64().unwrap() >= 1, "{told}");
+    let full = recording.folder().join("full.mcap");
+    let mut limited = std::process::Command::new("sh");
+    let (program, take, out) = (env!("CARGO_BIN_EXE_toile"), take.display(), full.display());
+    limited.arg("-c").arg(format!("ulimit -f 600; exec {program} export {take} --mcap {out} --json"));
+    let told = exits(1, &mut limited);
+    assert!(told["error"]["message"].as_str().unwrap().contains("full.mcap"), "{told}");
+    assert!(!full.exists() && !full.with_extension("mcap.part").exists());
+}
+
+#[test]
 fn a_full_disk_at_import_leaves_nothing_half_written() {
     let recording = Recording::with_noise(4);
     let takes = recording.subject().join("takes");
     fs::create_dir_all(&takes).unwrap();
     std::os::unix::fs::symlink("/dev/full", takes.join("00-body.mcap.part")).unwrap();
-    // An import replaces an old .part, so the disk is made full by a limit on the size of files instead.
+    // An import replaces an old .part, so the disk is made full by a limit on the size of files instead; the signal that
+    // comes with it must not end the program before it can say so.
     let mut limited = std::process::Command::new("sh");
     let words = recording.import("body").join(" ");
-    limited.arg("-c").arg(format!("ulimit -f 8; trap '' XFSZ; exec {} {words}", env!("CARGO_BIN_EXE_toile")));
+    limited.arg("-c").arg(format!("ulimit -f 8; exec {} {words}", env!("CARGO_BIN_EXE_toile")));
     let answer = exits(1, &mut limited);
     let message = answer["error"]["message"].as_str().unwrap();
     assert!(message.contains("disk") && message.contains("free some space"), "{message}");

@@ -64,6 +64,20 @@ fn a_turn_that_is_not_full_is_a_warning() {
 }
 
 #[test]
+fn damaged_colour_is_counted_where_a_take_is_fused() {
+    let dir = tempfile::tempdir().unwrap();
+    let folders = dir.path().join("half");
+    let words = ["--as", "folders", "--garments", "", "--frames", "36", "--degrees", "220", "--seed", "6"];
+    exits(0, toile().arg("synthesize").arg("--out").arg(&folders).args(words));
+    let take = folders.join("00-body");
+    let picture = take.join("color/000003.jpg");
+    let whole = fs::read(&picture).unwrap();
+    fs::write(&picture, &whole[..whole.len() / 2]).unwrap();
+    let answer = exits(3, toile().arg("fuse").arg(&take).arg("--out").arg(dir.path().join("scan")));
+    assert!(answer["lost"].to_string().contains("the colour image of 1 frames is damaged"), "{answer}");
+}
+
+#[test]
 fn a_garment_take_that_shows_no_new_garment() {
     let (_dir, subject) = copy_of_olga();
     // The trousers take shows the body once more.
@@ -125,8 +139,7 @@ fn a_full_disk_while_processing_leaves_no_half_file_and_the_next_run_goes_on() {
     let (_dir, subject) = copy_of_olga();
     drop_trousers(&subject);
     let mut limited = Command::new("sh");
-    let words =
-        format!("ulimit -f 600; trap '' XFSZ; exec {} fuse {} --json", env!("CARGO_BIN_EXE_toile"), subject.display());
+    let words = format!("ulimit -f 600; exec {} fuse {} --json", env!("CARGO_BIN_EXE_toile"), subject.display());
     let answer = exits(1, limited.arg("-c").arg(words));
     let message = answer["error"]["message"].as_str().unwrap();
     assert!(message.contains("scan.ply") && message.contains("free some space"), "{message}");

@@ -32,6 +32,33 @@ fn no_command_writes_over_a_take_or_a_file_of_another_kind() {
 }
 
 #[test]
+fn an_export_into_a_subject_or_twice_into_one_file_is_refused() {
+    let recording = Recording::new(4, 4);
+    exits(0, toile().args(recording.import("body")));
+    let (anna, one) = (recording.subject(), recording.folder().join("x.glb"));
+    for name in ["toile.toml", "pending.toml", "build/01-x/scan.ply", "edits", "avatar.vrm"] {
+        exits(2, toile().arg("export").arg(&anna).arg("--glb").arg(anna.join(name)));
+        assert!(!anna.join(name).exists(), "{name}");
+    }
+    exits(2, toile().arg("export").arg(&anna).arg("--vrm").arg(anna.join("avatar.glb")));
+    exits(2, toile().arg("export").arg(&anna).arg("--glb").arg(&one).arg("--vrm").arg(&one));
+}
+
+#[test]
+fn of_two_that_make_a_person_in_one_folder_at_once_one_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let make = |seed: &str| {
+        let mut command = toile();
+        command.arg("synthesize").arg("--out").arg(dir.path().join("fold"));
+        command.args(["--as", "folders", "--garments", "", "--frames", "3", "--seed", seed, "--json"]);
+        command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap()
+    };
+    let mut codes: Vec<_> = ["1", "2"].map(make).into_iter().map(|mut run| run.wait().unwrap().code()).collect();
+    codes.sort();
+    assert_eq!(codes, [Some(0), Some(2)]);
+}
+
+#[test]
 fn the_demo_does_not_write_over_recordings_of_the_same_name() {
     let dir = tempfile::tempdir().unwrap();
     for name in ["recorded/anna", "out/anna"] {

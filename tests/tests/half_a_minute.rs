@@ -27,7 +27,7 @@ fn read(path: &Path) -> Mesh {
 fn area_below(mesh: &Mesh, height: f32) -> f64 {
     let low = |t: &usize| mesh.corners(*t).iter().all(|c| c.y < height);
     let area = |t: usize| {
-        let [a, b, c] = mesh.corners(t).map(|p| p.cast::<f64>());
+        let [a, b, c] = mesh.corners(t).map(nalgebra::OPoint::cast::<f64>);
         0.5 * (b - a).cross(&(c - a)).norm()
     };
     (0..mesh.triangles.len()).filter(low).map(area).sum()

@@ -12,4 +12,5 @@ mod regular;
 pub use atomic_write::{atomic_write, atomic_write_all, atomic_write_with};
 pub use part::part_path;
 pub(crate) use part::{claim, create_parent, sync_parent, with_suffix};
-pub use regular::{open_regular, read_bytes, read_text};
+pub(crate) use regular::MAX_IMAGE_BYTES;
+pub use regular::{is_there, open_regular, read_bytes, read_limited, read_text};

@@ -5,9 +5,14 @@
 //! optional `color` (the same fields, of a colour camera that is not registered to depth) with `color_from_depth`
 //! (4×4, 16 numbers row by row, metres).
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
 
 use nalgebra::Matrix4;
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
@@ -16,6 +21,15 @@ use super::{
     rigid::rigid_from_matrix,
 };
 use crate::{CaptureError, DeviceIdentity, Rig, Sensor, depth_codec::MAX_PIXELS, files::read_text};
+
+/// Focal lengths as shares of the picture's longer side: from a fisheye's to a long telephoto lens's.
+const FOCAL_LENGTHS: RangeInclusive<f64> = 0.05..=50.0;
+/// Metres a depth unit, from a micrometre to a decimetre.
+const DEPTH_SCALES: RangeInclusive<f64> = 1e-6..=0.1;
+/// Frames a second.
+const FRAME_RATES: RangeInclusive<f64> = 0.01..=1e4;
+/// The largest coefficient of distortion.
+const MAX_DISTORTION: f64 = 100.0;
 
 /// The content of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,23 +114,29 @@ pub(super) fn read(path: &Path) -> Result<CameraFile, CaptureError> {
 }
 
 pub(super) fn parse(text: &str) -> Result<CameraFile, Fault> {
-    let value: Value =
-        serde_json::from_str(text).map_err(|error| Fault::of_file(format!("is not readable JSON: {error}")))?;
+    let Unique(value) = serde_json::from_str(text).map_err(|error: serde_json::Error| {
+        Fault::of_file(if error.is_data() { error.to_string() } else { format!("is not readable JSON: {error}") })
+    })?;
     let object = value.as_object();
     let object = object.ok_or_else(|| Fault::of_file("must be a JSON object with width, height, fx, fy, cx, cy"))?;
     let depth = parse_camera(object, "")?;
     let depth_scale = optional_positive(object, "depth_scale")?;
+    let depth_scale = depth_scale.map(|scale| if scale >= 1.0 { 1.0 / scale } else { scale });
+    if let Some(scale) = depth_scale.filter(|scale| !DEPTH_SCALES.contains(scale)) {
+        let given = &object["depth_scale"];
+        let reason = format!("is {given}, which makes a depth unit {scale:e} m long; 0.001 are millimetres");
+        return Err(Fault::at("", "depth_scale", reason));
+    }
+    let fps = optional_positive(object, "fps")?;
+    if let Some(fps) = fps.filter(|fps| !FRAME_RATES.contains(fps)) {
+        return Err(Fault::at("", "fps", format!("is {fps}; it must be from 0.01 to 10000 frames a second")));
+    }
     let color = match object.get("color") {
         None | Some(Value::Null) => None,
         Some(Value::Object(color)) => Some((parse_camera(color, "color.")?, parse_pose(object, "color_from_depth")?)),
         Some(_) => return Err(Fault::at("", "color", "must be an object with the colour camera's fields")),
     };
-    Ok(CameraFile {
-        depth,
-        depth_scale: depth_scale.map(|scale| if scale >= 1.0 { 1.0 / scale } else { scale }),
-        fps: optional_positive(object, "fps")?,
-        color,
-    })
+    Ok(CameraFile { depth, depth_scale, fps, color })
 }
 
 fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCamera, Fault> {
@@ -132,9 +152,17 @@ fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCame
         let number = |name: &str| required(object, prefix, name);
         [number("fx")?, number("fy")?, number("cx")?, number("cy")?]
     };
+    let longest = f64::from(width.max(height));
     for (name, focal) in [("fx", fx), ("fy", fy)] {
         if focal <= 0.0 {
             return Err(Fault::at(prefix, name, format!("is {focal}; a focal length in pixels is above 0")));
+        }
+        if !FOCAL_LENGTHS.contains(&(focal / longest)) {
+            let least = longest * FOCAL_LENGTHS.start();
+            let largest = longest * FOCAL_LENGTHS.end();
+            let reason =
+                format!("is {focal}; a focal length is in pixels, of this picture from {least:.0} to {largest:.0}");
+            return Err(Fault::at(prefix, name, reason));
         }
     }
     for (name, centre, size) in [("cx", cx, width), ("cy", cy, height)] {
@@ -150,11 +178,15 @@ fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCame
         let reason = format!("and `{prefix}height` give {width} x {height} pixels, which are too many");
         return Err(Fault::at(prefix, "width", reason));
     }
-    let distortion = match object.get("distortion") {
+    let distortion: [f64; 5] = match object.get("distortion") {
         None | Some(Value::Null) => [0.0; 5],
         Some(list) => numbers(list)
             .ok_or_else(|| Fault::at(prefix, "distortion", "must be a list of 5 numbers: k1 k2 p1 p2 k3"))?,
     };
+    if let Some(wild) = distortion.iter().find(|k| k.abs() > MAX_DISTORTION) {
+        let reason = format!("has {wild}; no lens bends more than {MAX_DISTORTION}");
+        return Err(Fault::at(prefix, "distortion", reason));
+    }
     Ok(PinholeCamera { distortion, ..PinholeCamera::ideal(width, height, fx, fy, cx, cy) })
 }
 
@@ -197,6 +229,68 @@ fn numbers<const N: usize>(value: &Value) -> Option<[f64; N]> {
     list.try_into().ok().filter(|list: &[f64; N]| list.iter().all(|x| x.is_finite()))
 }
 
+/// A JSON value in which no object has a field twice: which of them is meant is not known.
+struct Unique(Value);
+
+impl<'de> Deserialize<'de> for Unique {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(UniqueVisitor).map(Unique)
+    }
+}
+
+struct UniqueVisitor;
+
+impl<'de> Visitor<'de> for UniqueVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E: Error>(self, value: bool) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let mut list = Vec::new();
+        while let Some(Unique(value)) = access.next_element()? {
+            list.push(value);
+        }
+        Ok(list.into())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let mut object = Map::new();
+        while let Some((key, Unique(value))) = access.next_entry::<String, Unique>()? {
+            if object.contains_key(&key) {
+                return Err(A::Error::custom(format!("the field `{key}` is there twice; keep the right one")));
+            }
+            object.insert(key, value);
+        }
+        Ok(object.into())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -217,6 +311,14 @@ mod tests {
             (GOOD.replace('}', r#", "color": {"width": 3}}"#), "`color.height` is missing"),
             (GOOD.replace("256", "600"), "`cx` is 600"),
             (GOOD.replace("212", "-1"), "`cy` is -1"),
+            (GOOD.replace("365.0", "1e9"), "`fx` is 1000000000"),
+            (GOOD.replace("366", "0.5"), "`fy` is 0.5"),
+            (GOOD.replace("0.001", "1"), "`depth_scale` is 1"),
+            (GOOD.replace("0.001", "1e300"), "`depth_scale` is 1e+300"),
+            (GOOD.replace('}', r#", "fps": 1e-9}"#), "`fps` is"),
+            (GOOD.replace('}', r#", "distortion": [1e9, 0, 0, 0, 0]}"#), "`distortion` has 1000000000"),
+            (GOOD.replace('}', r#", "fx": 900}"#), "`fx` is there twice"),
+            (GOOD.replace('}', r#", "color": {"fx": 1, "fx": 2}}"#), "`fx` is there twice"),
             ("[]".to_string(), "JSON object"),
             (GOOD[..40].to_string(), "not readable JSON"),
         ];

@@ -10,9 +10,15 @@ use super::{
     inventory::{
         DEFAULT_FPS, Entry, FolderSource, Listing, Refused, has_extension, last_number, measured_fps, pair, steady_time,
     },
-    timed::{Timed, named_by_time, pair_by_time},
+    number_list::number_list,
+    timed::{Timed, check_time, named_by_time, pair_by_time},
 };
-use crate::{CaptureError, files::read_text, printable, trajectory::parse_seconds};
+use crate::{
+    CaptureError,
+    files::{is_there, read_text},
+    printable, printable_path,
+    trajectory::parse_seconds,
+};
 
 /// Metres a depth unit where the calibration does not say: millimetres.
 const DEPTH_SCALE: f64 = 0.001;
@@ -44,12 +50,15 @@ pub(super) fn open(path: &Path, listing: &Listing) -> Result<FolderSource, Captu
     };
     // Numbers may leave some out, so only names that are times show the rate.
     let rate = if is_timed { measured_fps(&entries) } else { None };
+    let mut remarks = Vec::new();
     if let Some(stamps) = read_times(path)? {
-        set_times(path, &mut entries, &stamps)?;
+        remarks.extend(set_times(path, &mut entries, &stamps)?);
     }
     let has_color = entries.iter().any(|entry| entry.color.is_some());
     let fps = camera.fps.or(rate).unwrap_or(DEFAULT_FPS);
-    FolderSource::new(path, camera.rig("toile-folder", DEPTH_SCALE, fps, has_color), entries, None)
+    let mut source = FolderSource::new(path, camera.rig("toile-folder", DEPTH_SCALE, fps, has_color), entries, None)?;
+    source.remarks = remarks;
+    Ok(source)
 }
 
 const DEPTH_EXTENSIONS: &[&str] = &["png"];
@@ -85,8 +94,8 @@ struct Stamp {
 }
 
 /// Gives frames the times of timestamps.txt. Of two frames with the same time the first is kept and the second refused:
-/// which of them was taken then is not known.
-fn set_times(path: &Path, entries: &mut [Entry], stamps: &[Stamp]) -> Result<(), CaptureError> {
+/// which of them was taken then is not known. Says which frames have a time, but lie outside of those that are there.
+fn set_times(path: &Path, entries: &mut [Entry], stamps: &[Stamp]) -> Result<Option<String>, CaptureError> {
     let numbers: Vec<u64> = entries.iter().map(|entry| entry.number).collect();
     let first = first_line(path, &numbers, stamps.len())?;
     let (mut before, mut repeated) = (None, 0);
@@ -107,7 +116,16 @@ fn set_times(path: &Path, entries: &mut [Entry], stamps: &[Stamp]) -> Result<(),
         let reason = format!("{repeated} of {} frames have the same time as the one before", entries.len());
         return Err(CaptureError::format(&path.join("timestamps.txt"), reason));
     }
-    Ok(())
+    Ok(first.and_then(|first| missing_ends(path, &numbers, first, stamps.len() as u64)))
+}
+
+/// Which frames timestamps.txt has a time for before the first and behind the last image; `None` where there are none.
+fn missing_ends(path: &Path, numbers: &[u64], first: u64, lines: u64) -> Option<String> {
+    let (low, high) = (*numbers.first()?, *numbers.last()?);
+    let missing: Vec<u64> = (first..low).chain(high + 1..first + lines).collect();
+    let file = printable_path(&path.join("timestamps.txt"));
+    let (count, list) = (missing.len(), number_list(&missing));
+    (count > 0).then(|| format!("{file}: of {count} frames there is a time, but no image: {list}"))
 }
 
 /// Which frame number the first line of timestamps.txt belongs to; `None`: lines go by position.
@@ -136,7 +154,7 @@ fn first_line(path: &Path, numbers: &[u64], lines: usize) -> Result<Option<u64>,
 /// The times, which do not fall: whole numbers are nanoseconds, numbers with a decimal point seconds.
 fn read_times(folder: &Path) -> Result<Option<Vec<Stamp>>, CaptureError> {
     let path = folder.join("timestamps.txt");
-    if !path.exists() {
+    if !is_there(&path) {
         return Ok(None);
     }
     let text = read_text(&path)?;
@@ -150,6 +168,7 @@ fn read_times(folder: &Path) -> Result<Option<Vec<Stamp>>, CaptureError> {
                 format!("line {} is not a time in nanoseconds: `{}`", number + 1, printable(word)),
             )
         })?;
+        check_time(time_ns).map_err(|reason| CaptureError::format(&path, format!("line {}: {reason}", number + 1)))?;
         if stamps.last().is_some_and(|before| before.time_ns > time_ns) {
             return Err(CaptureError::format(&path, format!("line {} is earlier than the one before", number + 1)));
         }
@@ -161,6 +180,17 @@ fn read_times(folder: &Path) -> Result<Option<Vec<Stamp>>, CaptureError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_without_an_image_at_either_end_are_said() {
+        let said = |numbers: &[u64], first, lines| missing_ends(Path::new("x"), numbers, first, lines);
+        assert_eq!((said(&[0, 2, 3], 0, 4), said(&[2, 3], 2, 2)), (None, None));
+        let both = said(&[2, 3], 0, 6).unwrap();
+        assert!(
+            both.starts_with("x/timestamps.txt: ") && both.contains("of 4 frames") && both.ends_with("0-1, 4-5"),
+            "{both}"
+        );
+    }
 
     #[test]
     fn timestamps_are_found_for_gaps_at_the_ends_and_inside() {

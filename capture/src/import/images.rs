@@ -4,7 +4,11 @@ use std::path::Path;
 
 use toile_geometry::camera::PinholeCamera;
 
-use crate::{CaptureError, ColorImage, DepthImage, encoded, files::read_bytes};
+use crate::{CaptureError, ColorImage, DepthImage, encoded, files};
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, CaptureError> {
+    files::read_limited(path, files::MAX_IMAGE_BYTES)
+}
 
 /// Reads a 16-bit PNG of the depth camera's size.
 pub(super) fn read_depth(path: &Path, camera: &PinholeCamera) -> Result<DepthImage, CaptureError> {

@@ -152,6 +152,8 @@ pub(super) struct FolderSource {
     /// A depth value that means "nothing was measured", besides 0.
     missing_value: Option<u16>,
     next: usize,
+    /// What is known to be missing, a sentence each.
+    pub(super) remarks: Vec<String>,
 }
 
 impl FolderSource {
@@ -168,7 +170,7 @@ impl FolderSource {
         let stride = entries.windows(2).fold(0, |all, pair| gcd(all, pair[1].number.saturating_sub(pair[0].number)));
         let stride = stride.max(1);
         rig.sensors.iter_mut().for_each(|sensor| sensor.fps /= stride as f64);
-        Ok(Self { rig, entries, stride, missing_value, next: 0 })
+        Ok(Self { rig, entries, stride, missing_value, next: 0, remarks: Vec::new() })
     }
 
     pub(super) fn entries(&self) -> &[Entry] {
@@ -232,6 +234,10 @@ impl Source for FolderSource {
 
     fn frame_count(&self) -> Option<u64> {
         Some(self.entries.len() as u64)
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.clone()
     }
 }
 

@@ -1,10 +1,14 @@
 //! Which layout a folder has, and opening it.
 
-use std::{fmt, path::Path, str::FromStr};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use super::{
-    folder,
-    inventory::{FolderSource, Listing},
+    camera_file, folder,
+    inventory::{Entry, FolderSource, Listing},
     seven_scenes, tum, uva,
 };
 use crate::{CaptureError, Replay, Source, printable};
@@ -86,6 +90,22 @@ pub fn open_with(path: &Path, options: &ImportOptions) -> Result<Box<dyn Source>
         return Ok(Box::new(Replay::open(path)?));
     }
     Ok(Box::new(open_folder(path, format, options.apply_mask)?))
+}
+
+/// The files that decide what [`open`] gives of a folder: its own, its calibration's, and its frames' images.
+///
+/// # Errors
+/// As [`open`].
+pub fn files(path: &Path) -> Result<Vec<PathBuf>, CaptureError> {
+    let source = open_folder(path, guess(path)?, false)?;
+    let own = Listing::read(path)?.files.into_iter().map(|name| path.join(name));
+    let of_entry = |entry: &Entry| [entry.depth.clone(), entry.color.clone(), entry.mask.clone()];
+    let images = source.entries().iter().flat_map(of_entry).flatten();
+    let all = own.chain(camera_file::find(path)?).chain(images);
+    let mut files: Vec<PathBuf> = all.filter(|file| file.is_file()).collect();
+    files.sort();
+    files.dedup();
+    Ok(files)
 }
 
 /// Guesses a folder's format from the names in it.

@@ -34,7 +34,7 @@ mod timed;
 mod tum;
 mod uva;
 
-pub use layout::{Format, ImportOptions, guess, open, open_with};
+pub use layout::{Format, ImportOptions, files, guess, open, open_with};
 pub(crate) use number_list::number_list;
 pub use poses::reference_poses;
 pub use record::{ImportReport, record};

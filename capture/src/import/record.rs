@@ -16,6 +16,8 @@ pub struct ImportReport {
     pub without_depth: Vec<u64>,
     /// Device numbers of frames that have depth but no colour, where the sensor has colour.
     pub without_color: Vec<u64>,
+    /// Device numbers of frames whose colour image is damaged or cut off; they are in the recording as they came.
+    pub damaged_color: Vec<u64>,
     /// Frames that the device's numbers say are missing between those that are there.
     pub lost: u64,
     /// Frames that could not be read, each with the reason; they are not in the recording.
@@ -35,23 +37,32 @@ impl ImportReport {
         if frame.color.is_none() && has_color_camera {
             self.without_color.push(frame.device_frame);
         }
+        if frame.color.as_ref().is_some_and(|color| color.check().is_err()) {
+            self.damaged_color.push(frame.device_frame);
+        }
     }
 
     /// True where nothing is missing.
     pub fn is_complete(&self) -> bool {
-        self.without_depth.is_empty() && self.without_color.is_empty() && self.lost == 0 && self.unreadable.is_empty()
+        let whole = [&self.without_depth, &self.without_color, &self.damaged_color];
+        whole.iter().all(|numbers| numbers.is_empty()) && self.lost == 0 && self.unreadable.is_empty()
     }
 
     /// True where data that was in the source is not in the recording.
     pub fn lost_data(&self) -> bool {
-        !self.unreadable.is_empty()
+        !self.unreadable.is_empty() || !self.damaged_color.is_empty()
     }
 }
 
 impl fmt::Display for ImportReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} frames", self.frames)?;
-        for (numbers, what) in [(&self.without_depth, "without depth"), (&self.without_color, "without colour")] {
+        let lists = [
+            (&self.without_depth, "without depth"),
+            (&self.without_color, "without colour"),
+            (&self.damaged_color, "with a damaged colour image"),
+        ];
+        for (numbers, what) in lists {
             if !numbers.is_empty() {
                 write!(f, "; {} {what}: {}", numbers.len(), number_list(numbers))?;
             }

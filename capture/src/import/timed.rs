@@ -15,6 +15,14 @@ pub(super) struct Timed {
     pub(super) path: PathBuf,
 }
 
+/// Refuses a time that a recording cannot hold.
+pub(super) fn check_time(time_ns: i64) -> Result<(), String> {
+    if time_ns >= 0 {
+        return Ok(());
+    }
+    Err(format!("the time {time_ns} ns is before 0, and a recording holds no such time; count from an earlier moment"))
+}
+
 /// Pairs each depth image with the colour image nearest in time, closest pairs first, each used once. Frames are in the
 /// order of their times and are numbered by it.
 pub(super) fn pair_by_time(mut depth: Vec<Timed>, mut color: Vec<Timed>) -> Vec<Entry> {

@@ -14,7 +14,7 @@ use super::{
     inventory::{
         DEFAULT_FPS, Entry, FolderSource, Listing, has_extension, last_number, measured_fps, pair, steady_time,
     },
-    timed::{Timed, pair_by_time},
+    timed::{Timed, check_time, pair_by_time},
 };
 use crate::{CaptureError, files::read_text, printable, trajectory::parse_seconds};
 
@@ -60,9 +60,12 @@ fn read_list(folder: &Path, name: &str) -> Result<Vec<Timed>, CaptureError> {
         let timed = line
             .split_once(char::is_whitespace)
             .and_then(|(time, file)| Some(Timed { time_ns: parse_seconds(time)?, path: folder.join(file.trim()) }));
-        list.push(timed.ok_or_else(|| {
+        let timed = timed.ok_or_else(|| {
             CaptureError::format(&path, format!("line {} is not `time file`: `{}`", number + 1, printable(line)))
-        })?);
+        })?;
+        check_time(timed.time_ns)
+            .map_err(|reason| CaptureError::format(&path, format!("line {}: {reason}", number + 1)))?;
+        list.push(timed);
     }
     Ok(list)
 }

@@ -26,6 +26,8 @@ pub struct SubjectInspection {
     pub name: String,
     /// Date of the visit.
     pub date: String,
+    /// What is remarkable about its folder, a sentence each.
+    pub remarks: Vec<String>,
 }
 
 /// One recording or folder.

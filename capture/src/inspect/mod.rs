@@ -23,7 +23,8 @@ use problems::problems;
 pub fn inspect(path: &Path) -> Result<Inspection, CaptureError> {
     let (subject, takes) = if Subject::exists(path) {
         let subject = Subject::open(path)?;
-        let head = SubjectInspection { name: subject.name().to_string(), date: subject.date().to_string() };
+        let (name, date) = (subject.name().to_string(), subject.date().to_string());
+        let head = SubjectInspection { name, date, remarks: subject.remarks() };
         (Some(head), inspect_layers(&subject))
     } else {
         (None, vec![inspect_take(path)?])
@@ -66,8 +67,10 @@ fn inspect_take(path: &Path) -> Result<TakeInspection, CaptureError> {
         take.bytes = fs::metadata(path).map_err(|error| CaptureError::io(path, error))?.len();
         read_frames(&mut replay, &mut take);
     } else {
-        read_frames(import::open(path, Some(format))?.as_mut(), &mut take);
+        let mut source = import::open(path, Some(format))?;
+        read_frames(source.as_mut(), &mut take);
+        take.problems = source.remarks();
     }
-    take.problems = problems(&take);
+    take.problems.extend(problems(&take));
     Ok(take)
 }

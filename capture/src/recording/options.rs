@@ -21,8 +21,9 @@ pub struct RecorderOptions {
     /// A chunk is closed and synced to the disk after the frame that brings it to this many bytes; a power cut loses
     /// one chunk at most. Default 4 MiB, less than half a second of a 640×480 sensor.
     pub chunk_bytes: usize,
-    /// Delete a `.part` file of an earlier, interrupted run (right for imports, which can be repeated). When false it is
-    /// moved to `.part.1`, `.part.2`, ...
+    /// What is recorded can be made again: a `.part` file of an earlier, interrupted run is deleted, and so is this one
+    /// where it is not finished (a full disk). When false the earlier one is moved to `.part.1`, `.part.2`, ..., and this
+    /// one stays.
     pub replace_part: bool,
 }
 

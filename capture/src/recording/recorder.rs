@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     CaptureError, ColorImage, DepthImage, Frame, RgbImage, Rig,
-    files::{claim, create_parent, open_regular, part_path, sync_parent, with_suffix},
+    files::{claim, create_parent, is_there, open_regular, part_path, sync_parent, with_suffix},
 };
 
 /// Writes a recording. It grows as `FILE.part` and becomes `FILE` in [`Self::finish`]; dropped before, the `.part` stays
@@ -37,6 +37,8 @@ pub struct Recorder {
     channels: BTreeMap<(usize, Stream), u16>,
     frames: u64,
     pending: usize,
+    kept: Option<PathBuf>,
+    is_finished: bool,
 }
 
 impl Recorder {
@@ -51,15 +53,14 @@ impl Recorder {
         }
         create_parent(path)?;
         let part = part_path(path);
-        if !options.replace_part {
-            keep_part(&part)?;
-        }
+        let kept = if options.replace_part { None } else { keep_part(&part)? };
         let file = claim(&part).map_err(|error| CaptureError::io(&part, error))?;
         let file = file.ok_or_else(|| CaptureError::Busy { path: path.to_path_buf() })?;
         let twin = file.try_clone().map_err(|error| CaptureError::io(&part, error))?;
         let writer = start_writer(file, rig, options.depth).map_err(|error| mcap_error(&part, error))?;
         let (path, rig, channels) = (path.to_path_buf(), rig.clone(), BTreeMap::new());
-        Ok(Self { path, part, rig, options, writer, file: twin, channels, frames: 0, pending: 0 })
+        let (file, is_finished) = (twin, false);
+        Ok(Self { path, part, rig, options, writer, file, channels, frames: 0, pending: 0, kept, is_finished })
     }
 
     /// The rig that is recorded.
@@ -101,6 +102,11 @@ impl Recorder {
         &self.part
     }
 
+    /// Where the `.part` of an earlier, interrupted run was moved to, where there was one.
+    pub fn kept_part(&self) -> Option<&Path> {
+        self.kept.as_deref()
+    }
+
     /// Closes the file, syncs it and gives it its final name.
     ///
     /// # Errors
@@ -110,6 +116,7 @@ impl Recorder {
         self.file.sync_all().map_err(|error| CaptureError::io(&self.part, error))?;
         let bytes = self.file.metadata().map_err(|error| CaptureError::io(&self.part, error))?.len();
         fs::rename(&self.part, &self.path).map_err(|error| CaptureError::io(&self.path, error))?;
+        self.is_finished = true;
         sync_parent(&self.path)?;
         Ok(RecordingSummary { path: self.path.clone(), frames: self.frames, bytes })
     }
@@ -251,15 +258,25 @@ impl Recorder {
     }
 }
 
-/// Moves what an interrupted run recorded out of the way.
-fn keep_part(part: &Path) -> Result<(), CaptureError> {
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        if self.options.replace_part && !self.is_finished {
+            // A failure here leaves a file that the next run removes.
+            let _ = fs::remove_file(&self.part);
+        }
+    }
+}
+
+/// Moves what an interrupted run recorded out of the way, and says where to.
+fn keep_part(part: &Path) -> Result<Option<PathBuf>, CaptureError> {
     let is_recording = fs::symlink_metadata(part).is_ok_and(|found| found.is_file());
     if !is_recording || is_in_use(part) {
-        return Ok(());
+        return Ok(None);
     }
-    let kept = (1_u32..).map(|n| with_suffix(part, &format!(".{n}"))).find(|kept| !kept.exists());
+    let kept = (1_u32..).map(|n| with_suffix(part, &format!(".{n}"))).find(|kept| !is_there(kept));
     let kept = kept.unwrap_or_else(|| with_suffix(part, ".kept"));
-    fs::rename(part, kept).map_err(|error| CaptureError::io(part, error))
+    fs::rename(part, &kept).map_err(|error| CaptureError::io(part, error))?;
+    Ok(Some(kept))
 }
 
 /// True while another process records into a file.

@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::layer::{Layer, check_name};
+use super::{
+    comments::keep_comments,
+    layer::{Layer, check_name},
+};
 use crate::{
     CaptureError,
-    files::{atomic_write, read_text},
+    files::{atomic_write, is_there, read_text},
 };
 
 /// The content of `subject.toml`.
@@ -20,6 +23,9 @@ pub(super) struct About {
     pub(super) rig: String,
     #[serde(default)]
     pub(super) notes: String,
+    /// Fields that mean nothing to this program; they are kept.
+    #[serde(flatten)]
+    pub(super) unknown: toml::Table,
     #[serde(default)]
     pub(super) layers: Vec<Layer>,
 }
@@ -28,7 +34,7 @@ impl About {
     /// Reads the file of a subject's folder.
     pub(super) fn read(folder: &Path) -> Result<Self, CaptureError> {
         let path = path(folder);
-        if !path.exists() {
+        if !is_there(&path) {
             return Err(CaptureError::format(folder, "is not a subject folder: it has no subject.toml"));
         }
         Self::parse(&read_text(&path)?).map_err(|reason| CaptureError::format(&path, reason))
@@ -47,11 +53,22 @@ impl About {
         Ok(about)
     }
 
-    /// Writes the file, whole or not at all.
+    /// Writes the file, whole or not at all. Comments of the one that it replaces stay.
     pub(super) fn write(&self, folder: &Path) -> Result<(), CaptureError> {
         let path = path(folder);
         let text = toml::to_string(self).map_err(|error| CaptureError::format(&path, error.to_string()))?;
-        atomic_write(&path, text.as_bytes())
+        let old = if is_there(&path) { read_text(&path)? } else { String::new() };
+        atomic_write(&path, keep_comments(&old, &text).as_bytes())
+    }
+
+    /// The fields that mean nothing to this program, such as misspelt ones.
+    pub(super) fn unknown_fields(&self) -> Vec<String> {
+        let of_layer = |layer: &Layer| {
+            let label = layer.label();
+            layer.unknown.keys().map(|key| format!("`{key}` of layer {label}")).collect::<Vec<_>>()
+        };
+        let own = self.unknown.keys().map(|key| format!("`{key}`"));
+        own.chain(self.layers.iter().flat_map(of_layer)).collect()
     }
 }
 

@@ -25,13 +25,23 @@ pub struct Layer {
     /// Free text.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub notes: String,
+    /// Fields that mean nothing to this program; they are kept.
+    #[serde(flatten)]
+    pub(super) unknown: toml::Table,
 }
 
 impl Layer {
     /// Layer `number` called `name`, of type `garment`; the body is never a garment.
     pub(super) fn new(number: usize, name: &str, garment: Option<&str>) -> Self {
         let garment = garment.filter(|_| number > 0).map(String::from);
-        Self { number, name: name.to_string(), garment, thickness_mm: None, notes: String::new() }
+        Self {
+            number,
+            name: name.to_string(),
+            garment,
+            thickness_mm: None,
+            notes: String::new(),
+            unknown: toml::Table::new(),
+        }
     }
 
     /// Name with the number, as files, folders and mesh nodes carry it: `01-trousers`; `00-body`.

@@ -27,6 +27,8 @@ pub struct LockedSubject {
     is_new: bool,
     /// The take that an interrupted run had recorded, and that was completed on opening.
     completed: Option<Note>,
+    /// What was being recorded when an earlier run was killed.
+    interrupted: Option<Note>,
     _lock: SubjectLock,
 }
 
@@ -157,6 +159,12 @@ impl LockedSubject {
         self.layer(split_number(name).1).filter(|layer| layer.number == note.number)
     }
 
+    /// True where the half recording of layer `name` that an interrupted run left is an import's, which can be repeated.
+    pub fn was_importing(&self, name: &str) -> bool {
+        let is_import = |note: &Note| !note.source.is_empty() && note.layer.name == split_number(name).1;
+        self.interrupted.as_ref().is_some_and(is_import)
+    }
+
     /// Forgets a take that will not be recorded. A subject that was created for it is removed, unless its folder holds
     /// anything else.
     pub fn give_up(self) {
@@ -175,7 +183,7 @@ impl LockedSubject {
         let name = absolute.file_name().map_or_else(|| "subject".into(), |name| name.to_string_lossy().into_owned());
         let about = About { name, date: today(), ..About::default() };
         let subject = Subject { folder: folder.to_path_buf(), about };
-        let locked = Self { subject, is_new: true, completed: None, _lock: lock };
+        let locked = Self { subject, is_new: true, completed: None, interrupted: None, _lock: lock };
         locked.save()?;
         Ok(locked)
     }
@@ -184,7 +192,8 @@ impl LockedSubject {
     fn repaired(folder: &Path, lock: SubjectLock) -> Result<Self, CaptureError> {
         let entered = About::read(folder)?;
         let subject = Subject::open(folder)?;
-        let mut locked = Self { subject, is_new: false, completed: None, _lock: lock };
+        let interrupted = Note::read(folder);
+        let mut locked = Self { subject, is_new: false, completed: None, interrupted, _lock: lock };
         locked.complete_pending()?;
         locked.complete_retakes()?;
         if locked.about != entered {

@@ -14,6 +14,7 @@
 //! subject's folder without changing its takes (stages, edits) holds a [`SubjectLock`].
 
 mod about;
+mod comments;
 mod date;
 mod layer;
 mod lock;

@@ -10,7 +10,11 @@ use super::{
     layer::{Layer, check_name},
     pending::Note,
 };
-use crate::CaptureError;
+use crate::{
+    CaptureError,
+    files::{is_there, open_regular},
+    printable_path,
+};
 
 /// A subject's folder. Reading it changes nothing on disk; [`LockedSubject`](super::LockedSubject) can write.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,7 +37,7 @@ impl Subject {
 
     /// True where a folder is a subject.
     pub fn exists(folder: &Path) -> bool {
-        about::path(folder).is_file()
+        folder.is_dir() && is_there(&about::path(folder))
     }
 
     /// The folder.
@@ -89,6 +93,39 @@ impl Subject {
     /// `build/NN-name/`.
     pub fn build_folder(&self, layer: &Layer) -> PathBuf {
         self.build_path().join(layer.label())
+    }
+
+    /// What the operator should know of the folder itself, a sentence each: fields of `subject.toml` that mean nothing, and
+    /// takes that a killed capture left half recorded.
+    pub fn remarks(&self) -> Vec<String> {
+        let file = printable_path(&about::path(&self.folder));
+        let unknown = self.about.unknown_fields().into_iter();
+        let unknown =
+            unknown.map(|field| format!("{file}: the field {field} is not known; it is kept, but means nothing"));
+        let left = self.interrupted_takes().into_iter().map(|take| {
+            let take = printable_path(&take);
+            format!(
+                "{take} was left by a recording that was interrupted; `toile inspect` shows what is in it, and `toile \
+                 import` makes it a take"
+            )
+        });
+        unknown.chain(left).collect()
+    }
+
+    /// Recordings in `takes/` that were not finished and that no process writes any more, by name.
+    fn interrupted_takes(&self) -> Vec<PathBuf> {
+        let is_part = |path: &PathBuf| {
+            path.to_string_lossy().rsplit_once(".mcap.part").is_some_and(|(_, end)| {
+                end.is_empty() || end.strip_prefix('.').is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit()))
+            })
+        };
+        let is_left = |path: &PathBuf| {
+            open_regular(path).is_ok_and(|file| !matches!(file.try_lock(), Err(fs::TryLockError::WouldBlock)))
+        };
+        let files = fs::read_dir(self.takes_folder()).into_iter().flatten().flatten().map(|file| file.path());
+        let mut takes: Vec<PathBuf> = files.filter(is_part).filter(is_left).collect();
+        takes.sort();
+        takes
     }
 
     pub(super) fn takes_folder(&self) -> PathBuf {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use toile_capture::{ClockDomain, DeviceIdentity, Sensor};
+use toile_capture::{ClockDomain, DeviceIdentity, Sensor, files::read_text};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use crate::UvcDepthError;
@@ -24,7 +24,7 @@ struct File {
 /// [`UvcDepthError::Calibration`] names the field that is missing or impossible.
 pub fn read(path: &Path) -> Result<Sensor, UvcDepthError> {
     let wrong = |reason: String| UvcDepthError::Calibration { path: path.to_path_buf(), reason };
-    let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
+    let text = read_text(path).map_err(|e| wrong(e.reason()))?;
     parse(&text).map_err(wrong)
 }
 
@@ -52,6 +52,12 @@ fn parse(text: &str) -> Result<Sensor, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_no_regular_file_is_refused_without_waiting() {
+        let told = read(Path::new("/dev/null")).unwrap_err().to_string();
+        assert!(told.contains("not a regular file"), "{told}");
+    }
 
     const GOOD: &str = "name = \"gemini\"\ndepth_scale = 0.001\n[camera]\nwidth = 640\nheight = 400\nfx = 475.0\nfy = 475.0\ncx = 319.5\ncy = 199.5\n";
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
+use toile_capture::files::read_text;
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use crate::WebcamError;
@@ -45,7 +46,7 @@ impl ColorCalibration {
     /// [`WebcamError::Calibration`] names the file and the field that is missing or impossible.
     pub fn read(path: &Path) -> Result<Self, WebcamError> {
         let wrong = |reason: String| WebcamError::Calibration { path: path.to_path_buf(), reason };
-        let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
+        let text = read_text(path).map_err(|e| wrong(e.reason()))?;
         parse(&text).map_err(wrong)
     }
 }
@@ -73,6 +74,12 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
+
+    #[test]
+    fn what_is_no_regular_file_is_refused_without_waiting() {
+        let told = ColorCalibration::read(Path::new("/dev/null")).unwrap_err().to_string();
+        assert!(told.contains("not a regular file"), "{told}");
+    }
 
     const GOOD: &str = "[camera]\nwidth = 1280\nheight = 720\nfx = 940.0\nfy = 940.0\ncx = 639.5\ncy = 359.5\n\
                         [color_from_depth]\nposition = [0.0, 0.1, 0.0]\nrotation = [0.0, 90.0, 0.0]\n";

@@ -8,6 +8,8 @@ use crate::FittingError;
 
 /// Range of the longest side of a scan of a person or a part of one, metres.
 const PERSON: std::ops::Range<f64> = 0.25..2.6;
+/// A vertex further than this from the middle of the others, metres, is no part of a room with a person in it.
+const FARTHEST: f64 = 50.0;
 /// A side of at least this share of the longest one may be the person's height: arms can span as much.
 const UPRIGHT: f64 = 0.7;
 
@@ -69,6 +71,7 @@ pub(crate) fn prepare(scan: &Mesh) -> Result<Prepared, FittingError> {
     let (lo, hi) = trimmed_bounds(&scan.positions);
     let extent = (hi - lo).cast::<f64>();
     let scale = unit(extent.max())?;
+    check_far(&scan.positions, nalgebra::center(&lo, &hi), scale)?;
     let mut notices = Vec::new();
     if scale != 1.0 {
         let unit = if scale == 0.001 { "millimetres" } else { "centimetres" };
@@ -84,6 +87,16 @@ pub(crate) fn prepare(scan: &Mesh) -> Result<Prepared, FittingError> {
     }
     mesh.recompute_normals();
     Ok(Prepared { mesh, scale, ups: ups(&extent), notices })
+}
+
+/// Refuses a vertex that lies further away than any room is wide: distances to it would swamp all others.
+fn check_far(points: &[Point3<f32>], middle: Point3<f32>, scale: f64) -> Result<(), FittingError> {
+    let distance = |p: &Point3<f32>| (p.cast::<f64>() - middle.cast::<f64>()).norm() * scale;
+    let Some((vertex, point)) = points.iter().enumerate().find(|(_, p)| distance(p) > FARTHEST) else { return Ok(()) };
+    Err(FittingError::Scan(format!(
+        "vertex {vertex} (counted from 0) lies {:.3e} m from the person: remove what does not belong to the scan",
+        distance(point)
+    )))
 }
 
 fn unit(longest: f64) -> Result<f64, FittingError> {
@@ -146,6 +159,18 @@ mod tests {
         assert_eq!(unit(1800.0).unwrap(), 0.001);
         assert_eq!(unit(180.0).unwrap(), 0.01);
         assert!(unit(0.02).is_err() && unit(0.0).is_err() && unit(9000.0).is_err() && unit(f64::NAN).is_err());
+    }
+
+    #[test]
+    fn a_vertex_far_away_is_named_and_one_across_the_room_is_not() {
+        let mut points: Vec<Point3<f32>> = (0..1000).map(|i| Point3::new(0.0, 0.0018 * i as f32, 0.0)).collect();
+        points.push(Point3::new(0.2, 0.0, 0.3));
+        let mut mesh = Mesh::new(points, vec![[0, 500, 1000]]);
+        for (far, is_refused) in [(3.0, false), (1e12, true), (f32::MAX, true)] {
+            mesh.positions[7].x = far;
+            let told = prepare(&mesh).err().map(|e| e.to_string());
+            assert_eq!(told.as_ref().is_some_and(|t| t.contains("vertex 7 ")), is_refused, "{far}: {told:?}");
+        }
     }
 
     #[test]

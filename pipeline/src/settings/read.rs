@@ -3,8 +3,11 @@
 use std::{ops::Range, path::Path};
 
 use serde_json::Value;
-use toile_capture::files::read_text;
-use toml::{Table, de::Error};
+use toile_capture::files::{is_there, read_text};
+use toml::{
+    Spanned, Table,
+    de::{DeTable, DeValue, Error},
+};
 
 use super::{Settings, fields::FIELDS};
 use crate::{PipelineError, json};
@@ -18,12 +21,13 @@ pub const FILE_NAME: &str = "toile.toml";
 /// [`PipelineError::Format`] with file and field (and the line) where a field is unknown, of the wrong kind or out of its
 /// range.
 pub fn read(subject: Option<&Path>, file: Option<&Path>) -> Result<Settings, PipelineError> {
-    let own = subject.map(|folder| folder.join(FILE_NAME)).filter(|path| path.exists());
+    let own = subject.map(|folder| folder.join(FILE_NAME)).filter(|path| is_there(path));
     let mut all = Table::new();
     for path in own.as_deref().into_iter().chain(file) {
         let text = read_text(path)?;
         let settings: Settings = toml::from_str(&text).map_err(|e| wrong(path, &text, &e))?;
         check(path, &settings)?;
+        check_finite(path, &text)?;
         merge(&mut all, toml::from_str(&text).map_err(|e| wrong(path, &text, &e))?);
     }
     // Each file was read alone before, so this cannot fail on a field of one of them.
@@ -57,9 +61,33 @@ fn check(path: &Path, settings: &Settings) -> Result<(), PipelineError> {
     Ok(())
 }
 
+/// Refuses `nan` and `inf`, which no range holds.
+fn check_finite(path: &Path, text: &str) -> Result<(), PipelineError> {
+    // What is not TOML was refused before.
+    let Ok(table) = DeTable::parse(text) else { return Ok(()) };
+    let mut values: Vec<&Spanned<DeValue>> = table.get_ref().values().collect();
+    while let Some(value) = values.pop() {
+        match value.get_ref() {
+            DeValue::Float(float) if float.as_str().parse::<f64>().is_ok_and(|x| !x.is_finite()) => {
+                let line = line_at(text, value.span().start);
+                let reason = format!("line {line}: {float} is not a number that can be used");
+                return Err(PipelineError::field(path, &field_at(text, &value.span()), reason));
+            }
+            DeValue::Array(list) => values.extend(list.iter()),
+            DeValue::Table(table) => values.extend(table.values()),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn line_at(text: &str, at: usize) -> usize {
+    1 + text[..at.min(text.len())].matches('\n').count()
+}
+
 fn wrong(path: &Path, text: &str, error: &Error) -> PipelineError {
     let Some(span) = error.span() else { return PipelineError::format(path, error.message()) };
-    let line = 1 + text[..span.start.min(text.len())].matches('\n').count();
+    let line = line_at(text, span.start);
     let reason = format!("line {line}: {}", error.message().replace('\n', "; "));
     PipelineError::field(path, &field_at(text, &span), reason)
 }
@@ -118,6 +146,8 @@ mod tests {
             ("[extract]\nrounds = -1\n", "extract.rounds", "line 2"),
             ("[motion]\nloop = true\n", "motion.loop", "unknown field `loop`"),
             ("[under_clothes]\nheading = 3\n", "under_clothes.heading", "unknown field"),
+            ("[fusion]\nvoxel_size = nan\n", "fusion.voxel_size", "line 2: nan is not a number"),
+            ("[fusion]\n\nmax_depth = -inf\n", "fusion.max_depth", "line 3: -inf is not a number"),
             ("[fusion]\nvoxel_size = 4\n", "fusion.voxel_size", "4.0 is not between 0.0005 and 0.05 metres"),
         ] {
             let error = read_one(text).unwrap_err();
@@ -126,5 +156,8 @@ mod tests {
             assert!(error.to_string().contains(words), "{error}");
         }
         assert!(read_one("[fusion\n").is_err());
+        let dir = tempfile::tempdir().unwrap();
+        std::os::unix::fs::symlink("gone", dir.path().join(FILE_NAME)).unwrap();
+        assert!(read(Some(dir.path()), None).unwrap_err().to_string().contains(FILE_NAME), "a link that leads nowhere");
     }
 }

@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
-use toile_capture::files::read_bytes;
+use toile_capture::files::{is_there, read_limited};
 use toile_fitting::rigged_scan;
 use toile_garments::{DressedTake, Edits, Extraction, ExtractionReport, Warning, extract};
 use toile_geometry::ply;
@@ -43,7 +43,7 @@ impl Cut<'_> {
 
     /// The layer's edits, where there are any.
     fn edits(&self) -> Option<PathBuf> {
-        Some(self.run.folders.edits(self.layer())).filter(|path| path.exists())
+        Some(self.run.folders.edits(self.layer())).filter(|path| is_there(path))
     }
 
     /// Remarks about the findings.
@@ -129,5 +129,5 @@ impl Step for Cut<'_> {
 /// # Errors
 /// [`PipelineError::Format`] where the file is not a valid edits file, and why.
 pub fn read_edits(path: &Path) -> Result<Edits, PipelineError> {
-    Edits::from_json(&read_bytes(path)?).map_err(|e| PipelineError::format(path, e))
+    Edits::from_json(&read_limited(path, json::MAX_BYTES)?).map_err(|e| PipelineError::format(path, e))
 }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Translation3};
 use serde_json::Value;
+use toile_capture::files::is_there;
 use toile_character::BodyModel;
 use toile_fitting::{BodyFit, FitReport, FitSettings, Mend, Verdict, fit_body, measure_table, rig_scan};
 use toile_geometry::{Mesh, Rigid, color_transfer::closest_colors, ply};
@@ -16,7 +17,7 @@ use crate::{
     PipelineError, Run,
     body_edits::BodyEdits,
     json,
-    meshes::read_mesh,
+    meshes::{check_kind, read_mesh},
     rigged_scan::rigged_scan,
     step::{Product, Step},
 };
@@ -53,7 +54,7 @@ impl<'a> Fit<'a> {
     /// [`PipelineError`] where the edits of the body cannot be used.
     pub fn of_subject(run: &'a Run<'a>, model: &'a BodyModel) -> Result<Self, PipelineError> {
         let (layer, folders) = (run.first_layer(), &run.folders);
-        let edits = Some(folders.edits("body")).filter(|path| path.exists());
+        let edits = Some(folders.edits("body")).filter(|path| is_there(path));
         let edits = edits.as_deref().map(BodyEdits::read).transpose()?.unwrap_or_default();
         let (scan, folder, pose) = (folders.scan(layer), folders.body(), folders.pose(layer));
         Ok(Self { run, model, scan, folder, pose, keep_frame: true, settings: edits.over(&run.settings.fit) })
@@ -118,6 +119,7 @@ impl Step for Fit<'_> {
     }
 
     fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
+        check_kind(&self.scan)?;
         Ok(vec![self.scan.clone()])
     }
 

@@ -111,6 +111,7 @@ impl Capture {
         let take = subject.take_path(&pending.layer);
         let kept = subject.accept(pending)?;
         session.progress.end();
+        subject.remarks().iter().for_each(|remark| session.progress.remark(remark));
         Ok((recorded, take, kept))
     }
 

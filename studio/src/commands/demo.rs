@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 use toile_capture::{
-    files::{atomic_write, read_bytes},
+    files::{atomic_write, is_there, read_bytes},
     printable_path,
 };
 use toile_pipeline::Options;
@@ -98,17 +98,19 @@ fn copy(from: &Path, to: &Path) -> Result<(), StudioError> {
         let entries = fs::read_dir(from).map_err(|e| StudioError::io(from, e))?;
         return entries.flatten().try_for_each(|e| copy(&e.path(), &to.join(e.file_name())));
     }
-    if !from.exists() {
+    if !is_there(from) {
         return Ok(());
     }
     let bytes = read_bytes(from)?;
-    match fs::read(to) {
+    if !is_there(to) {
+        return Ok(atomic_write(to, &bytes)?);
+    }
+    match read_bytes(to) {
         Ok(old) if old == bytes => Ok(()),
-        Ok(_) => Err(StudioError::Usage(format!(
+        _ => Err(StudioError::Usage(format!(
             "{} is there already and is not a copy of {}; choose another --out, nothing recorded is overwritten",
             printable_path(to),
             printable_path(from)
         ))),
-        Err(_) => Ok(atomic_write(to, &bytes)?),
     }
 }

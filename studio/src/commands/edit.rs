@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use toile_capture::{files::atomic_write, printable_path};
+use toile_capture::{
+    files::{atomic_write, is_there},
+    printable_path,
+};
 use toile_garments::Edits;
 use toile_pipeline::{Folders, Goal, Options, Run, json, process, read_mesh, settings, steps::cut::read_edits};
 
@@ -80,10 +83,14 @@ impl Edit {
         }
         let path = run.folders.edits(layer);
         let Some((file, mut edits)) = edits else {
-            return if path.exists() { fs::remove_file(&path).map_err(|e| StudioError::io(&path, e)) } else { Ok(()) };
+            return if is_there(&path) {
+                fs::remove_file(&path).map_err(|e| StudioError::io(&path, e))
+            } else {
+                Ok(())
+            };
         };
         edits.check_on(&read_mesh(&run.folders.scan(layer))?).map_err(|e| StudioError::format(file, e))?;
-        if self.add && path.exists() {
+        if self.add && is_there(&path) {
             let Edits { strokes, hems, .. } = std::mem::take(&mut edits);
             edits = read_edits(&path)?;
             edits.strokes.extend(strokes);

@@ -15,7 +15,7 @@ use toile_pipeline::{Goal, HiddenChoice, Options};
 use crate::{
     StudioError,
     commands::{
-        output::{check_model, check_new},
+        output::{Model, check_model, check_new, is_same_place},
         reach::{motion_choice, must_exist, reach},
     },
     outcome::Answer,
@@ -101,7 +101,15 @@ impl Export {
             check_new(plain)?;
             return convert(&self.path, plain);
         }
-        [&self.glb, &self.vrm].into_iter().flatten().try_for_each(|copy| check_model(copy))?;
+        let copies = [(&self.glb, Model::Glb), (&self.vrm, Model::Vrm)];
+        if let (Some(glb), Some(vrm)) = (&self.glb, &self.vrm)
+            && is_same_place(glb, vrm)
+        {
+            return Err(StudioError::Usage(format!("--glb and --vrm are the same file: {}", printable_path(glb))));
+        }
+        for (copy, model) in copies {
+            copy.iter().try_for_each(|copy| check_model(copy, model, &self.path))?;
+        }
         let options = Options {
             motion: motion_choice(self.motion.as_deref()),
             joint_names: self.joint_names.map(Into::into),
@@ -111,9 +119,9 @@ impl Export {
         };
         options.check()?;
         let mut answer = reach(&self.path, Goal::Avatar, &options, session)?;
-        for (copy, name) in [(&self.glb, "avatar.glb"), (&self.vrm, "avatar.vrm")] {
+        for (copy, model) in copies {
             let Some(copy) = copy else { continue };
-            atomic_write(copy, &read_bytes(&self.path.join(name))?)?;
+            atomic_write(copy, &read_bytes(&self.path.join(model.file_name()))?)?;
             answer.text.push_str(&format!("{}\n", printable_path(copy)));
         }
         answer.text.push_str(&left_out(&answer.results));
@@ -141,9 +149,13 @@ fn left_out(results: &Value) -> String {
 }
 
 fn convert(recording: &Path, plain: &Path) -> Result<Answer, StudioError> {
-    let lost =
-        Replay::open(recording)?.lost().map(|l| format!("{}: {l}", printable_path(recording))).into_iter().collect();
+    let shown = printable_path(recording);
+    let mut lost: Vec<String> = Replay::open(recording)?.lost().map(|l| format!("{shown}: {l}")).into_iter().collect();
     let written = export_standard(recording, plain)?;
+    if let Some(first) = written.unreadable.first() {
+        let count = written.unreadable.len();
+        lost.push(format!("{shown}: {count} frames cannot be read and are left out; the first: {first}"));
+    }
     let text = format!("{}: {} frames\n", printable_path(plain), written.frames);
     let results = json!({ "file": printable_path(plain), "frames": written.frames, "bytes": written.bytes });
     Ok(Answer { text, results, lost, ..Answer::default() })

@@ -108,7 +108,7 @@ fn fit_scan(
     session: &Session,
 ) -> Result<Answer, StudioError> {
     must_exist(scan)?;
-    check_stage(out, &[&FILES[..], &["pose.json"]].concat(), scan)?;
+    check_stage(out, FitStep::NAME, &[&FILES[..], &["pose.json"]].concat(), scan)?;
     let name = scan.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let run = Run::single(
         scan.parent().unwrap_or(Path::new(".")),

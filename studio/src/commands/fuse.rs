@@ -115,7 +115,7 @@ impl Fuse {
         let name = self.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("{name}-scan")));
         let root = self.path.parent().unwrap_or(Path::new("."));
-        check_stage(&out, &["scan.ply", "trajectory.tum"], &self.path)?;
+        check_stage(&out, FuseStep::NAME, &["scan.ply", "trajectory.tum"], &self.path)?;
         let settings = settings::read(None, self.settings.as_deref())?;
         let run = Run::single(root, &name, settings, session.progress.as_ref());
         session.progress.plan(FuseStep::SECONDS);

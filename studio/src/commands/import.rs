@@ -94,10 +94,11 @@ impl Import {
         subject.announce(&pending)?;
         session.progress.plan(1.0);
         session.progress.begin(&format!("{}: import", pending.layer.label()), 1.0);
-        let report = record(opened, &pending.path, session)?;
+        let report = record(opened, &pending.path, subject.was_importing(&self.layer), session)?;
         let take = subject.take_path(&pending.layer);
         let kept = subject.accept(pending)?;
         session.progress.end();
+        subject.remarks().iter().for_each(|remark| session.progress.remark(remark));
         Ok((report, take, kept))
     }
 
@@ -138,9 +139,14 @@ fn missing_numbers(take: &Path) -> Vec<String> {
 /// At most this many missing frames are named.
 const NAMED: usize = 12;
 
-fn record(opened: &mut Opened, path: &Path, session: &Session) -> Result<ImportReport, StudioError> {
-    let options = RecorderOptions { replace_part: true, ..RecorderOptions::default() };
+/// `repeats`: a half recording that is there is of an import. Of a capture it is kept, since it cannot be made again.
+fn record(opened: &mut Opened, path: &Path, repeats: bool, session: &Session) -> Result<ImportReport, StudioError> {
+    let options = RecorderOptions { replace_part: repeats, ..RecorderOptions::default() };
     let recorder = Recorder::create(path, opened.source.rig(), options)?;
+    if let Some(kept) = recorder.kept_part() {
+        let kept = printable_path(kept);
+        session.progress.remark(&format!("the half take of a recording that was interrupted is kept as {kept}"));
+    }
     let copied = import::record(opened.source.as_mut(), recorder, &|x| session.progress.at(x));
     Ok(copied.inspect_err(|_| {
         // An import can be repeated, so a half-written recording is of no use.

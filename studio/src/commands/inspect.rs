@@ -30,7 +30,8 @@ impl Inspect {
     pub fn run(&self, _session: &Session) -> Result<Answer, StudioError> {
         must_exist(&self.path)?;
         let found = inspect(&self.path)?;
-        let (mut warnings, mut lost) = (Vec::new(), Vec::new());
+        let mut warnings = found.subject.as_ref().map_or_else(Vec::new, |subject| subject.remarks.clone());
+        let mut lost = Vec::new();
         for take in &found.takes {
             let problems = take.problems.iter().map(|p| format!("{}: {p}", take.name));
             if take.data_lost() { lost.extend(problems) } else { warnings.extend(problems) }

@@ -1,6 +1,10 @@
 //! `toile synthesize`: a synthetic subject with its truth.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
 
 use clap::ValueEnum;
 use serde_json::json;
@@ -88,17 +92,34 @@ impl Synthesize {
     /// [`StudioError`] where a setting is out of its range or a file cannot be written.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         let settings = self.settings()?;
-        if self.out.exists() {
-            return Err(StudioError::Usage(format!(
-                "{} exists already; choose another --out",
-                printable_path(&self.out)
-            )));
+        self.claim()?;
+        let done = self.make(&settings, session);
+        if done.is_err() {
+            // Only where nothing is in it.
+            drop(fs::remove_dir(&self.out));
         }
+        done
+    }
+
+    /// Makes the folder. Of two runs that begin at the same time only one can.
+    fn claim(&self) -> Result<(), StudioError> {
+        if let Some(above) = self.out.parent().filter(|above| !above.as_os_str().is_empty()) {
+            fs::create_dir_all(above).map_err(|e| StudioError::io(above, e))?;
+        }
+        fs::create_dir(&self.out).map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => {
+                StudioError::Usage(format!("{} exists already; choose another --out", printable_path(&self.out)))
+            }
+            _ => StudioError::io(&self.out, error),
+        })
+    }
+
+    fn make(&self, settings: &SyntheticSettings, session: &Session) -> Result<Answer, StudioError> {
         let wrong = |e| failed(&self.out, e);
         let progress = &session.progress;
         progress.plan(1.0);
         progress.begin(&format!("{}: synthesize", settings.name), 1.0);
-        let mut subject = Subject::new(&settings).map_err(wrong)?;
+        let mut subject = Subject::new(settings).map_err(wrong)?;
         let measured = self.measured(&mut subject)?;
         let truth = match self.kind {
             Kind::Folders => {
