@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use serde::Serialize;
-use toile_geometry::{Mesh, topology::Edges};
+use toile_geometry::Mesh;
 
 use crate::FittingError;
 
@@ -10,6 +10,9 @@ use crate::FittingError;
 const PERSON: std::ops::Range<f64> = 0.25..2.6;
 /// A vertex further than this from the middle of the others, metres, is no part of a room with a person in it.
 const FARTHEST: f64 = 50.0;
+/// Volume over area to the power of 1.5 of the thinnest scan whose triangles are known to face one way; a person's is ten
+/// times as large.
+const SOLID: f64 = 0.003;
 /// A side of at least this share of the longest one may be the person's height: arms can span as much.
 const UPRIGHT: f64 = 0.7;
 
@@ -81,12 +84,24 @@ pub(crate) fn prepare(scan: &Mesh) -> Result<Prepared, FittingError> {
         ));
     }
     let mut mesh = Mend { scale, ..Mend::default() }.apply(scan);
-    if Edges::new(&mesh.triangles).is_closed() && mesh.signed_volume() < 0.0 {
+    if faces_inward(&mesh) {
         mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         notices.push("the scan's triangles faced inward: they were turned outward".into());
     }
     mesh.recompute_normals();
     Ok(Prepared { mesh, scale, ups: ups(&extent), notices })
+}
+
+/// Whether triangles face inward, holes or not: by the volume that they enclose with the middle of the scan.
+fn faces_inward(mesh: &Mesh) -> bool {
+    let sum: Vector3<f64> = mesh.positions.iter().map(|p| p.coords.cast::<f64>()).sum();
+    let middle = Point3::from(sum / mesh.positions.len().max(1) as f64);
+    let enclosed = |t: usize| {
+        let [a, b, c] = mesh.corners(t).map(|p| p.cast::<f64>() - middle);
+        a.dot(&b.cross(&c)) / 6.0
+    };
+    let volume: f64 = (0..mesh.triangles.len()).map(enclosed).sum();
+    volume < -SOLID * mesh.area().powf(1.5)
 }
 
 /// Refuses a vertex that lies further away than any room is wide: distances to it would swamp all others.
@@ -170,6 +185,20 @@ mod tests {
             mesh.positions[7].x = far;
             let told = prepare(&mesh).err().map(|e| e.to_string());
             assert_eq!(told.as_ref().is_some_and(|t| t.contains("vertex 7 ")), is_refused, "{far}: {told:?}");
+        }
+    }
+
+    #[test]
+    fn triangles_that_face_inward_are_turned_outward_holes_or_not() {
+        let model = toile_character::BodyModel::load_default().unwrap();
+        let outward = Mesh::new(model.mean.clone(), model.triangles.clone());
+        let holed = outward.filter_triangles(|t| t % 20 != 0).0;
+        for mesh in [outward, holed] {
+            let mut inward = mesh.clone();
+            inward.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            let [turned, kept] = [&inward, &mesh].map(|m| prepare(m).unwrap());
+            assert!(turned.mesh.triangles == mesh.triangles && turned.notices.len() == 1);
+            assert!(kept.mesh.triangles == mesh.triangles && kept.notices.is_empty());
         }
     }
 
