@@ -30,7 +30,12 @@ run_one() {
     mkdir -p "corpus/$target" "artifacts/$target"
     local seeds=()
     [ ! -d "seeds/$target" ] || seeds+=("seeds/$target")
-    [ "$target" != recording ] || seeds+=("../capture/tests/data")
+    # Files of other programs, which the tests read too.
+    case "$target" in
+        recording) seeds+=("../capture/tests/data") ;;
+        ply | obj) seeds+=("../geometry/tests/data") ;;
+        bvh) seeds+=("../animation/tests/data") ;;
+    esac
     if "target/$host/release/$target" "corpus/$target" "${seeds[@]}" -max_total_time="$each" -rss_limit_mb=512 \
         -malloc_limit_mb=512 -timeout=10 -artifact_prefix="artifacts/$target/" >"artifacts/$target.log" 2>&1; then
         echo "$target: $(grep -c . <<<"$(ls "corpus/$target")") inputs kept, $(tail -n 1 "artifacts/$target.log")"

@@ -17,6 +17,9 @@ pub struct DeviceIdentity {
     /// The clock of its frames' device time.
     #[serde(default)]
     pub clock: ClockDomain,
+    /// Nobody gave its calibration: a usual one was assumed.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub calibration_assumed: bool,
 }
 
 /// One depth camera with its colour camera.
@@ -38,6 +41,20 @@ pub struct Sensor {
     pub rig_from_depth: Rigid,
     /// Nominal frames a second; 0 where unknown.
     pub fps: f64,
+}
+
+impl Sensor {
+    /// A sentence where its calibration is assumed.
+    pub fn assumption(&self) -> Option<String> {
+        let PinholeCamera { width, height, fx, .. } = self.depth;
+        self.identity.calibration_assumed.then(|| {
+            format!(
+                "nobody gave the calibration of `{}`: {fx:.0} pixels of focal length are assumed for {width} x {height}, and \
+                 lengths may be wrong by a fifth; write the true one into camera.json beside the images and import again",
+                self.name
+            )
+        })
+    }
 }
 
 /// One or more sensors that record together.

@@ -40,12 +40,14 @@ pub(super) struct CameraFile {
     pub(super) fps: Option<f64>,
     /// A colour camera that is not registered to depth.
     pub(super) color: Option<(PinholeCamera, Rigid)>,
+    /// No file gave it.
+    pub(super) is_assumed: bool,
 }
 
 impl CameraFile {
     /// An ideal camera without more.
     pub(super) fn ideal(depth: PinholeCamera) -> Self {
-        Self { depth, depth_scale: None, fps: None, color: None }
+        Self { depth, depth_scale: None, fps: None, color: None, is_assumed: false }
     }
 
     /// A rig of this one sensor.
@@ -57,7 +59,11 @@ impl CameraFile {
         Rig {
             sensors: vec![Sensor {
                 name: "camera".to_string(),
-                identity: DeviceIdentity { model: format!("import:{format}"), ..DeviceIdentity::default() },
+                identity: DeviceIdentity {
+                    model: format!("import:{format}"),
+                    calibration_assumed: self.is_assumed,
+                    ..DeviceIdentity::default()
+                },
                 depth: self.depth,
                 depth_scale: self.depth_scale.unwrap_or(depth_scale),
                 color: has_color.then_some(color),
@@ -136,7 +142,7 @@ pub(super) fn parse(text: &str) -> Result<CameraFile, Fault> {
         Some(Value::Object(color)) => Some((parse_camera(color, "color.")?, parse_pose(object, "color_from_depth")?)),
         Some(_) => return Err(Fault::at("", "color", "must be an object with the colour camera's fields")),
     };
-    Ok(CameraFile { depth, depth_scale, fps, color })
+    Ok(CameraFile { depth, depth_scale, fps, color, is_assumed: false })
 }
 
 fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCamera, Fault> {

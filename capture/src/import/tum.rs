@@ -127,7 +127,10 @@ fn default_camera(folder: &Path, entries: &[Entry]) -> Result<CameraFile, Captur
     let first = entries.iter().find_map(|entry| entry.depth.as_deref());
     let first = first.ok_or_else(|| CaptureError::format(folder, "there is no depth image in this folder"))?;
     match images::file_size(first)? {
-        (640, 480) => Ok(CameraFile::ideal(PinholeCamera::ideal(640, 480, 525.0, 525.0, 319.5, 239.5))),
+        (640, 480) => {
+            let usual = CameraFile::ideal(PinholeCamera::ideal(640, 480, 525.0, 525.0, 319.5, 239.5));
+            Ok(CameraFile { is_assumed: true, ..usual })
+        }
         (width, height) => Err(CaptureError::format(
             &folder.join("camera.json"),
             format!("is missing: the default calibration is for 640 x 480, the images have {width} x {height}"),
@@ -138,6 +141,23 @@ fn default_camera(folder: &Path, entries: &[Entry]) -> Result<CameraFile, Captur
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_calibration_that_nobody_gave_is_said_to_be_assumed() {
+        let usual = CameraFile {
+            is_assumed: true,
+            ..CameraFile::ideal(PinholeCamera::ideal(640, 480, 525.0, 525.0, 319.5, 239.5))
+        };
+        let sentences = [true, false].map(|is_assumed| {
+            let camera = CameraFile { is_assumed, ..usual.clone() };
+            camera.rig("tum", 0.0002, 30.0, false).sensors[0].assumption()
+        });
+        assert!(
+            sentences[0].as_ref().is_some_and(|s| s.contains("525 pixels") && s.contains("camera.json")),
+            "{sentences:?}"
+        );
+        assert_eq!(sentences[1], None);
+    }
 
     fn numbers(keys: &[&str]) -> Vec<(String, u64)> {
         let keys: Vec<String> = keys.iter().map(ToString::to_string).collect();

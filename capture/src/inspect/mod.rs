@@ -8,7 +8,7 @@ mod text;
 use std::{fs, path::Path};
 
 use crate::{
-    CaptureError, Layer, Replay, Subject,
+    CaptureError, Layer, Replay, Rig, Sensor, Source, Subject,
     import::{self, Format},
 };
 
@@ -54,6 +54,11 @@ fn inspect_layers(subject: &Subject) -> Vec<TakeInspection> {
     subject.layers().iter().map(inspect_layer).collect()
 }
 
+/// A sentence for each sensor whose calibration is assumed.
+fn assumptions(rig: &Rig) -> Vec<String> {
+    rig.sensors.iter().filter_map(Sensor::assumption).collect()
+}
+
 fn inspect_take(path: &Path) -> Result<TakeInspection, CaptureError> {
     let format = import::guess(path)?;
     let mut take = TakeInspection {
@@ -66,10 +71,12 @@ fn inspect_take(path: &Path) -> Result<TakeInspection, CaptureError> {
         take.loss = replay.lost().cloned();
         take.bytes = fs::metadata(path).map_err(|error| CaptureError::io(path, error))?.len();
         read_frames(&mut replay, &mut take);
+        take.problems = assumptions(replay.rig());
     } else {
         let mut source = import::open(path, Some(format))?;
         read_frames(source.as_mut(), &mut take);
         take.problems = source.remarks();
+        take.problems.extend(assumptions(source.rig()));
     }
     take.problems.extend(problems(&take));
     Ok(take)

@@ -24,6 +24,7 @@ pub fn rig(sensors: usize) -> Rig {
             serial: format!("{i}"),
             firmware: "1.2".into(),
             clock: ClockDomain::HostMonotonic,
+            ..DeviceIdentity::default()
         },
         depth: camera,
         depth_scale: 0.001,

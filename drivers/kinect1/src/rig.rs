@@ -32,6 +32,7 @@ pub(crate) fn rig(info: &DeviceInfo, serial: String, registration: &Registration
             serial,
             firmware: format!("{:x}.{:02x}", info.release >> 8, info.release & 0xff),
             clock: ClockDomain::Device,
+            ..DeviceIdentity::default()
         },
         depth: if settings.registered { registration.color_camera().0 } else { measured },
         depth_scale: 0.001,

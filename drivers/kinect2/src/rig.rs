@@ -22,6 +22,7 @@ pub(crate) fn rig(identity: Identity, calibration: &Calibration, registration: &
             serial: identity.serial,
             firmware: identity.firmware,
             clock: ClockDomain::Device,
+            ..DeviceIdentity::default()
         },
         depth: calibration.depth,
         depth_scale: 0.001,

@@ -32,6 +32,7 @@ pub(crate) fn rig(
         serial: details.serial.clone(),
         firmware: details.firmware.clone(),
         clock,
+        ..DeviceIdentity::default()
     };
     let name = format!("realsense-{}", details.serial);
     let sensor = Sensor {

@@ -8,7 +8,7 @@ use std::{
 };
 
 use serde_json::Value;
-use toile_capture::{CaptureError, Frame, Rig, Source, files::open_regular, import};
+use toile_capture::{CaptureError, Frame, Rig, Sensor, Source, files::open_regular, import};
 use toile_fusion::{FusionReport, FusionSettings, fuse};
 use toile_geometry::ply;
 
@@ -79,6 +79,8 @@ impl Step for Fuse<'_> {
             lost.push(format!("{}: the colour image of {} frames is damaged", self.name, source.damaged));
         }
         let mut warnings: Vec<String> = scan.report.warnings.iter().map(|w| format!("{}: {w}", self.name)).collect();
+        let assumed = source.rig().sensors.iter().take(1).filter_map(Sensor::assumption);
+        warnings.extend(assumed.map(|sentence| format!("{}: {sentence}", self.name)));
         if dropped > 0 {
             warnings.push(format!("{}: {dropped} frames never arrived while recording", self.name));
         }

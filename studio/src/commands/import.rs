@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use toile_capture::{
-    LockedSubject, PendingTake, Recorder, RecorderOptions, Replay,
+    LockedSubject, PendingTake, Recorder, RecorderOptions, Replay, Sensor,
     files::part_path,
     import::{self, Format, ImportReport},
     printable_path,
@@ -147,6 +147,8 @@ fn record(opened: &mut Opened, path: &Path, repeats: bool, session: &Session) ->
         let kept = printable_path(kept);
         session.progress.remark(&format!("the half take of a recording that was interrupted is kept as {kept}"));
     }
+    let assumed = opened.source.rig().sensors.iter().filter_map(Sensor::assumption);
+    assumed.for_each(|sentence| session.progress.remark(&sentence));
     let copied = import::record(opened.source.as_mut(), recorder, &|x| session.progress.at(x));
     Ok(copied.inspect_err(|_| {
         // An import can be repeated, so a half-written recording is of no use.
