@@ -103,7 +103,7 @@ impl Fuser {
         Ok(Outcome::Fused { model_from_camera: located.model_from_camera, tracked: located.tracked })
     }
 
-    /// Tells the tracker that few frames will come, in wide and uneven steps of a turntable.
+    /// Expects few frames from now on, in wide and uneven steps of a turntable.
     pub(crate) fn expect_few_views(&mut self) {
         self.tracker.expect_few_views();
     }
