@@ -14,6 +14,6 @@ mod read;
 mod tests;
 mod write;
 
-pub use model::{Bvh, BvhJoint, Channel, FRAME_TIMES};
+pub use model::{Bvh, BvhJoint, Channel, FRAME_TIMES, RestJoint};
 pub use read::{parse, read};
 pub use write::write;

@@ -38,10 +38,12 @@ mod dressed;
 mod error;
 mod glb;
 mod layer_mesh;
+mod motion;
 mod rig;
 mod vrm;
 
 pub use dressed::{Avatar, AvatarLayer};
 pub use error::AvatarError;
 pub use glb::write_glb;
+pub use motion::{FileMotion, MotionJoint, read_motion};
 pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, vrm_pose, write_vrm};

@@ -34,7 +34,7 @@ pub struct Demo {
     /// Folder of recorded sessions (default: the recorded/ found above the current folder or the program)
     #[arg(long, value_name = "DIR")]
     recorded: Option<PathBuf>,
-    /// BVH motion for the avatar (without: a walk that ships with Toile)
+    /// Motion for the avatar (BVH, or GLB or VRMA with an animation) (without: a walk that ships with Toile)
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
 }

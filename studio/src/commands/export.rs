@@ -45,7 +45,7 @@ Examples:
 pub struct Export {
     /// The subject; with --mcap a recording
     path: PathBuf,
-    /// BVH motion for the avatar, or `walk` for the one that ships with Toile (without: as the avatar was made last)
+    /// Motion for the avatar (BVH, or GLB or VRMA with an animation), or `walk` for the one that ships with Toile (without: as the avatar was made last)
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
     /// The names of the joints in avatar.glb: as VRM names its bones, by H-Anim, or as Mixamo does, which other

@@ -34,7 +34,7 @@ pub struct Process {
     /// Subject folders
     #[arg(required = true, value_name = "SUBJECT")]
     subjects: Vec<PathBuf>,
-    /// BVH motion for the avatar, or `walk` for the one that ships with Toile (without: as the avatar was made last)
+    /// Motion for the avatar (BVH, or GLB or VRMA with an animation), or `walk` for the one that ships with Toile (without: as the avatar was made last)
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
     /// turntable (usual): the person turns evenly before a resting camera; none: a camera held by hand
