@@ -14,11 +14,31 @@ const TOES_BY_FOOT: f64 = 0.5;
 /// Heel behind the ankle by the same length.
 const HEEL_BY_FOOT: f64 = 0.35;
 
+/// The joints of one leg.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Leg {
+    pub upper: Joint,
+    pub lower: Joint,
+    pub foot: Joint,
+    pub toes: Joint,
+}
+
+impl Leg {
+    pub const LEFT: Self =
+        Self { upper: Joint::LeftUpperLeg, lower: Joint::LeftLowerLeg, foot: Joint::LeftFoot, toes: Joint::LeftToes };
+    pub const RIGHT: Self = Self {
+        upper: Joint::RightUpperLeg,
+        lower: Joint::RightLowerLeg,
+        foot: Joint::RightFoot,
+        toes: Joint::RightToes,
+    };
+}
+
 /// Lifts every foot that is below the floor of the skeleton's rest.
 pub fn lift_out_of_floor(target: &Skeleton, poses: &mut [Pose]) {
     for pose in poses {
-        for upper in [Joint::LeftUpperLeg, Joint::RightUpperLeg] {
-            lift(target, pose, upper);
+        for leg in [Leg::LEFT, Leg::RIGHT] {
+            lift(target, pose, leg);
         }
     }
 }
@@ -34,20 +54,17 @@ pub fn foot_height(target: &Skeleton, pose: &Pose, foot: Joint, toes: Joint) -> 
     heel.y.min(ball)
 }
 
-fn lift(target: &Skeleton, pose: &mut Pose, upper: Joint) {
-    let (lower, foot, toes) = match upper {
-        Joint::LeftUpperLeg => (Joint::LeftLowerLeg, Joint::LeftFoot, Joint::LeftToes),
-        _ => (Joint::RightLowerLeg, Joint::RightFoot, Joint::RightToes),
-    };
-    let depth = -foot_height(target, pose, foot, toes);
+fn lift(target: &Skeleton, pose: &mut Pose, leg: Leg) {
+    let depth = -foot_height(target, pose, leg.foot, leg.toes);
     if depth > 0.0 {
-        raise_ankle(target, pose, [upper, lower, foot], depth);
+        raise_ankle(target, pose, leg, depth);
     }
-    bend_toes(target, pose, foot, toes);
+    bend_toes(target, pose, leg.foot, leg.toes);
 }
 
 /// Moves the ankle up by `height` in the plane of the leg; the foot keeps its turn in the world.
-fn raise_ankle(target: &Skeleton, pose: &mut Pose, leg: [Joint; 3], height: f64) {
+pub(crate) fn raise_ankle(target: &Skeleton, pose: &mut Pose, leg: Leg, height: f64) {
+    let leg = [leg.upper, leg.lower, leg.foot];
     let frames = pose.joint_frames(target);
     let [hip, knee, ankle] = leg.map(|j| frames[j.index()].translation.vector);
     let [thigh_turn, shank_turn, foot_turn] = leg.map(|j| frames[j.index()].rotation);

@@ -87,7 +87,7 @@ impl Export<'_> {
 impl Step for Export<'_> {
     type Report = Exported;
     const NAME: &'static str = "export";
-    const VERSION: u32 = 4;
+    const VERSION: u32 = 5;
     const SECONDS: f64 = 1.0;
 
     fn label(&self) -> String {
@@ -122,8 +122,7 @@ impl Step for Export<'_> {
     fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<Exported>, PipelineError> {
         let glb_path = self.run.folders.glb();
         let wrong = |e: AvatarError| PipelineError::stage(&glb_path, e);
-        let moved =
-            motion::load(self.motion_path().as_deref(), &self.body.skinned.skeleton, &self.run.settings.motion)?;
+        let moved = motion::load(self.motion_path().as_deref(), &self.body.skinned, &self.run.settings.motion)?;
         let mut avatar = self.dressed()?;
         let left_out = match &self.choice.hidden {
             Some(settings) => {

@@ -156,7 +156,7 @@ impl Page<'_> {
     ) -> Result<Vec<(String, Vec<Mesh>)>, PipelineError> {
         let (skeleton, pose0) = (&self.body.skinned.skeleton, &self.body.pose0);
         let path = self.choice.motion_path(&self.run.folders);
-        let motion: Motion = motion::load(path.as_deref(), skeleton, &self.run.settings.motion)?.motion;
+        let motion: Motion = motion::load(path.as_deref(), &self.body.skinned, &self.run.settings.motion)?.motion;
         let mut layers = vec![(body_mesh, &self.body.skinned.weights)];
         layers.extend(worn.iter().map(|(mesh, weights)| (mesh, weights)));
         let rest_from_pose0 = pose0.skinning_transforms(skeleton);
@@ -251,7 +251,7 @@ fn gap_shares(layer: &LayerReport) -> Vec<f64> {
 }
 
 fn measurement_rows(table: &MeasureTable) -> Vec<(String, String)> {
-    let row = |m: &BodyMeasure| (m.name.clone(), format!("{:.1} cm", 100.0 * m.value_m));
+    let row = |m: &BodyMeasure| (m.name.clone(), m.text());
     let mut rows: Vec<_> = table.measures.iter().map(row).collect();
     rows.push(("volume".into(), format!("{:.1} l", table.volume_l)));
     rows
