@@ -20,7 +20,7 @@ const SEEN_SHARE: f32 = 0.3;
 /// Gauss–Newton steps at most.
 const ITERATIONS: usize = 8;
 /// The conditions for pairs of hand and scan: within a finger's thickness and on the same side of it.
-const GATE: Gate = Gate { distance: 0.02, slip: 0.008, min_cos: 0.4, kernel: 0.005, noise: FIRST_NOISE, inside: 1.0 };
+const GATE: Gate = Gate { distance: 0.02, slip: 0.008, min_cos: 0.4, kernel: 0.005, noise: FIRST_NOISE, cloth: None };
 /// Standard deviation of the scan's fingers in the first take, metres. Fingers melt together in a scan, so that it counts
 /// little against the resting hand.
 const FIRST_NOISE: f32 = 0.015;

@@ -1,7 +1,6 @@
 //! Closest compatible points in both directions, with robust weights.
 
 use rayon::prelude::*;
-use toile_character::Joint;
 
 use crate::{
     solve::{Articulated, Gate, INDEPENDENT, Posed, Residual},
@@ -62,20 +61,18 @@ fn weigh(pairs: Vec<Option<Residual>>, areas: &[f64], gate: &Gate, body: &Articu
             cost += area;
             continue;
         };
+        let cloth = gate.cloth.filter(|_| r.value < 0.0);
+        let cloth = cloth.and_then(|cloth| cloth.over(body.main_joint(r.vertex as usize)));
+        r.value += cloth.map_or(0.0, |(stand_off, _)| stand_off);
         let squared = f64::from(r.value).powi(2);
-        let covered = r.value < 0.0 && gate.inside < 1.0 && !is_bare(body.main_joint(r.vertex as usize));
-        let counts = if covered { gate.inside } else { 1.0 };
-        cost += area * counts * squared / (squared + f64::from(gate.kernel).powi(2));
-        r.weight *= scale * counts * gate.robust(r.value);
+        cost += area * squared / (squared + f64::from(gate.kernel).powi(2));
+        r.weight *= match cloth {
+            Some((_, weight)) => 0.5 * weight / total,
+            None => scale * gate.robust(r.value),
+        };
         if r.weight > 0.0 {
             out.push(r);
         }
     }
     (out, cost / total)
-}
-
-/// Parts that clothes seldom cover: head, hands and feet.
-fn is_bare(joint: Joint) -> bool {
-    use Joint::*;
-    joint.is_finger() || matches!(joint, Head | LeftHand | RightHand | LeftFoot | RightFoot | LeftToes | RightToes)
 }

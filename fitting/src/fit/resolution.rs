@@ -4,7 +4,7 @@
 //! constrain each other; its gate reaches as far as a limb may still be off, its kernel is a quarter of that, and its
 //! noise is the misfit that the model keeps at so few components and samples.
 
-use toile_character::BodyModel;
+use toile_character::{BodyModel, Joint};
 use toile_geometry::Mesh;
 
 use super::{
@@ -13,13 +13,28 @@ use super::{
 };
 use crate::{
     FitSettings, FittingError,
-    solve::{Articulated, Columns, Gate, JointPrior, body_joints, main_joints},
+    solve::{Articulated, Cloth, Columns, Gate, JointPrior, body_joints, main_joints},
     surface::{Cloud, Samples, Thinned},
 };
 
-/// Weight of a vertex that lies inside the scan where cloth may cover it: the body lies snug in clothes only where they
-/// are tight, some twentieth of their area.
-const UNDER_CLOTH: f64 = 0.05;
+/// Clothes are alike over a span of some 30 cm, of which a person has 20.
+const CLOTH: Cloth = Cloth { stand_off, independent: 20.0 };
+
+/// How far clothes stand off, metres, by the ease that tailors give: some 10 cm around the chest, 6 around hips and thighs,
+/// 5 around knees and calves; 5 around sleeves that end half-way to the elbow or go on. Lower arms and necks are mostly bare, heads,
+/// hands and feet nearly always.
+fn stand_off(joint: Joint) -> f32 {
+    use Joint::*;
+    match joint {
+        Spine | Chest | UpperChest => 0.016,
+        Hips | LeftUpperLeg | RightUpperLeg => 0.010,
+        LeftLowerLeg | RightLowerLeg => 0.008,
+        LeftShoulder | RightShoulder | LeftUpperArm | RightUpperArm => 0.004,
+        LeftLowerArm | RightLowerArm | Neck => 0.002,
+        _ => 0.0,
+    }
+}
+
 /// Scan samples that are looked up on the body are this much sparser than those that the body is looked up on: the
 /// other direction has enough of them.
 const REVERSE: f32 = 2.5;
@@ -58,7 +73,7 @@ const COARSE: Resolution = Resolution {
     components: 4,
     turns: Turns::Main,
     iterations: 10,
-    gate: Gate { distance: 0.25, slip: 0.12, min_cos: 0.3, kernel: 0.06, noise: 0.02, inside: 1.0 },
+    gate: Gate { distance: 0.25, slip: 0.12, min_cos: 0.3, kernel: 0.06, noise: 0.02, cloth: None },
 };
 
 /// Fine enough that front and back differ clearly: feet, face and seat are 5 to 10 cm deep.
@@ -69,7 +84,7 @@ const HEADING: Resolution = Resolution {
     components: 12,
     turns: Turns::Body,
     iterations: 10,
-    gate: Gate { distance: 0.1, slip: 0.04, min_cos: 0.5, kernel: 0.025, noise: 0.006, inside: 1.0 },
+    gate: Gate { distance: 0.1, slip: 0.04, min_cos: 0.5, kernel: 0.025, noise: 0.006, cloth: None },
 };
 
 /// The right heading, all components: what is left is within a hand's thickness.
@@ -80,7 +95,7 @@ const MIDDLE: Resolution = Resolution {
     components: usize::MAX,
     turns: Turns::Body,
     iterations: 8,
-    gate: Gate { distance: 0.05, slip: 0.015, min_cos: 0.6, kernel: 0.010, noise: 0.003, inside: 1.0 },
+    gate: Gate { distance: 0.05, slip: 0.015, min_cos: 0.6, kernel: 0.010, noise: 0.003, cloth: None },
 };
 
 /// The error left is a finger's thickness; noise and iterations come from the settings.
@@ -91,7 +106,7 @@ const FINE: Resolution = Resolution {
     components: usize::MAX,
     turns: Turns::Body,
     iterations: 12,
-    gate: Gate { distance: 0.025, slip: 0.01, min_cos: 0.6, kernel: 0.006, noise: 0.002, inside: 1.0 },
+    gate: Gate { distance: 0.025, slip: 0.01, min_cos: 0.6, kernel: 0.006, noise: 0.002, cloth: None },
 };
 
 /// The four resolutions under the settings of one fit.
@@ -113,9 +128,9 @@ impl Resolutions {
 
 impl Resolution {
     fn under(self, settings: &FitSettings) -> Self {
-        let inside = if settings.dressed { UNDER_CLOTH } else { 1.0 };
+        let cloth = settings.dressed.then_some(CLOTH);
         let components = self.components.min(settings.components);
-        Self { components, gate: Gate { inside, ..self.gate }, ..self }
+        Self { components, gate: Gate { cloth, ..self.gate }, ..self }
     }
 }
 

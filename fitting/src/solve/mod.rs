@@ -12,7 +12,7 @@ mod state;
 pub(crate) use articulated::{Articulated, Posed};
 pub(crate) use descend::{Descent, Linearised, Problem, descend};
 pub(crate) use equations::{NormalEquations, Residual};
-pub(crate) use gate::{Gate, INDEPENDENT};
+pub(crate) use gate::{Cloth, Gate, INDEPENDENT};
 pub(crate) use point_to_point::{Norm, PointToPoint};
 pub(crate) use prior::{JointPrior, add_shape_prior};
 pub(crate) use state::{Columns, State, body_joints, main_joints};

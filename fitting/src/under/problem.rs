@@ -37,19 +37,19 @@ pub(crate) struct Resolution {
 pub(crate) const COARSE: Resolution = Resolution {
     scan_cell: 0.03,
     mesh_cell: 0.045,
-    gate: Gate { distance: 0.2, slip: 0.1, min_cos: 0.2, kernel: 0.05, noise: 0.02, inside: 1.0 },
+    gate: Gate { distance: 0.2, slip: 0.1, min_cos: 0.2, kernel: 0.05, noise: 0.02, cloth: None },
 };
 /// Within a hand's thickness.
 pub(crate) const MIDDLE: Resolution = Resolution {
     scan_cell: 0.014,
     mesh_cell: 0.026,
-    gate: Gate { distance: 0.1, slip: 0.04, min_cos: 0.4, kernel: 0.02, noise: 0.006, inside: 1.0 },
+    gate: Gate { distance: 0.1, slip: 0.04, min_cos: 0.4, kernel: 0.02, noise: 0.006, cloth: None },
 };
 /// The kernel is that of the cloth, from the settings.
 pub(crate) const FINE: Resolution = Resolution {
     scan_cell: 0.007,
     mesh_cell: 0.013,
-    gate: Gate { distance: 0.05, slip: 0.015, min_cos: 0.5, kernel: 0.0, noise: 0.002, inside: 1.0 },
+    gate: Gate { distance: 0.05, slip: 0.015, min_cos: 0.5, kernel: 0.0, noise: 0.002, cloth: None },
 };
 
 /// The mesh to be posed, ready to be thinned.
