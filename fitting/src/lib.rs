@@ -30,6 +30,7 @@ pub use {
         extremes::{Girth, Measurements, measure_extremes, stature},
         table::{BodyLandmark, MeasureTable, measure_table},
         taken::BodyMeasure,
+        uncertainty::{ErrorModel, ErrorModels, sideless},
     },
     rig::{rig_scan, rigged_scan},
     settings::{ConformSettings, FitSettings, HandLandmarks, LandmarkMap, Method, UnderSettings},

@@ -4,7 +4,8 @@
 //! - `extremes`: stature, and girths that are extremes within shares of the stature;
 //! - `standing`: the body standing straight with its landmarks; `parts`: which triangles a tape may touch;
 //!   `section`: plane sections and tapes; `levels`: heights that are found on the person's own surface;
-//! - `head`, `trunk`, `arm`, `leg`: each measurement beside its definition.
+//! - `head`, `trunk`, `arm`, `leg`: each measurement beside its definition;
+//! - `uncertainty`: how far a value may be off; `plausible`: whether the values go together as they do among people.
 //!
 //! `docs/measurements.md` has the same definitions for readers, with the deviations from the standard.
 
@@ -15,8 +16,10 @@ mod head;
 mod leg;
 mod levels;
 mod parts;
+mod plausible;
 mod section;
 mod standing;
 pub(crate) mod table;
 pub(crate) mod taken;
 mod trunk;
+pub(crate) mod uncertainty;

@@ -52,7 +52,7 @@ fn a_scan_is_measured_into_a_table() {
     let answer = exits(0, toile().arg("measure").arg("--scan").arg(&scan).arg("--out").arg(&out));
     let waist = answer["results"]["measurements_m"]["waist girth"].as_f64().unwrap();
     let csv = fs::read_to_string(out.join("measurements.csv")).unwrap();
-    assert!(csv.starts_with("measurement,kind,value,unit,height,definition\n"), "{csv}");
+    assert!(csv.starts_with("measurement,kind,value,unit,height,definition,uncertainty,seen,doubt\n"), "{csv}");
     let line: Vec<&str> = csv.lines().find(|l| l.starts_with("waist girth")).unwrap().split(',').collect();
     assert_eq!((line[1], line[3]), ("girth", "cm"));
     assert!((line[2].parse::<f64>().unwrap() - 100.0 * waist).abs() < 0.06, "{line:?}");

@@ -5,6 +5,7 @@ use toile_character::{BodyModel, Joint, JointRegressor, Pose, Skeleton, SkinnedM
 use toile_geometry::{Mesh, bvh::Bvh};
 
 use super::{
+    evidence::seen_vertices,
     fingers::fit_fingers,
     guides::Guides,
     prepare::{Mend, Prepared, prepare},
@@ -42,6 +43,8 @@ pub struct BodyFit {
     pub landmarks: Vec<ScanLandmark>,
     /// Stature and girths of the conformed body.
     pub measurements: Measurements,
+    /// Of each vertex of the template, whether the scan shows it.
+    pub seen: Vec<bool>,
     /// Residuals, coverage, iterations, notices.
     pub report: FitReport,
 }
@@ -60,6 +63,8 @@ impl BodyFit {
 
 /// Number of coarse starts that are taken to the middle resolution: the right heading and the one it is confused with.
 const HEADINGS_COMPARED: usize = 2;
+/// Scan within this of the body shows it, metres, as in the verdict's coverage of skin.
+const SEEN: f32 = 0.015;
 /// Turns below this are rounding, radians.
 const UPRIGHT: f64 = 1e-9;
 
@@ -121,11 +126,12 @@ pub fn fit_body(
     let measurements = measured(model, &body, &fine.state.pose);
     let mut report = judge(model, (&scan, &trust), &fine, &points, &measurements, settings.dressed);
     report.notices.splice(0..0, notices(prepared.notices, &mend));
+    let seen = seen_vertices(model, &points, (&scan, &trust), SEEN);
     progress(1.0);
     let State { pose, beta } = fine.state;
     let model_mesh = template(model, model.posed(&beta, &pose));
     let skeleton = body.skeleton.clone();
-    Ok(BodyFit { beta, pose, skeleton, body, model_mesh, mend, landmarks, measurements, report })
+    Ok(BodyFit { beta, pose, skeleton, body, model_mesh, mend, landmarks, measurements, seen, report })
 }
 
 /// Landmarks in a frame that is turned by `rotation`.

@@ -85,15 +85,8 @@ impl Distances {
 impl Coverage {
     /// Outer area of the body at `points` with trusted scan within `reach` metres.
     pub fn new(model: &BodyModel, points: &[Point3<f32>], scan: &Mesh, trust: &[f32], reach: f32) -> Self {
-        let none = Self { whole: 0.0, regions: BTreeMap::new() };
-        let Some(cloud) = Cloud::new(Samples::of_mesh(scan, &scan.normals, trust, COVER_CELL)) else { return none };
-        let mesh = Mesh::new(points.to_vec(), model.triangles.clone());
-        let (areas, normals) = (vertex_areas(&mesh), mesh.vertex_normals());
-        let is_seen = |v: usize| {
-            let hit = cloud.nearest(&points[v], &normals[v], reach, COVER_COS).map(|q| q as usize);
-            hit.is_some_and(|q| cloud.samples.weights[q] > 0.5 * cloud.samples.areas[q])
-        };
-        let seen: Vec<bool> = (0..points.len()).into_par_iter().with_min_len(128).map(is_seen).collect();
+        let areas = vertex_areas(&Mesh::new(points.to_vec(), model.triangles.clone()));
+        let seen = seen_vertices(model, points, (scan, trust), reach);
         let share = |is_in: &dyn Fn(usize) -> bool| {
             let (mut all, mut some) = (0.0, 0.0);
             for v in (0..points.len()).filter(|&v| !model.inner[v] && is_in(v)) {
@@ -110,4 +103,22 @@ impl Coverage {
     pub fn of(&self, region: Region) -> f64 {
         self.regions.get(region.words()).copied().unwrap_or(0.0)
     }
+}
+
+/// Of each vertex of a body at `points`, whether trusted scan lies within `reach` metres on the same side.
+pub(crate) fn seen_vertices(
+    model: &BodyModel,
+    points: &[Point3<f32>],
+    (scan, trust): (&Mesh, &[f32]),
+    reach: f32,
+) -> Vec<bool> {
+    let Some(cloud) = Cloud::new(Samples::of_mesh(scan, &scan.normals, trust, COVER_CELL)) else {
+        return vec![false; points.len()];
+    };
+    let normals = vertex_normals(points, &model.triangles);
+    let is_seen = |v: usize| {
+        let hit = cloud.nearest(&points[v], &normals[v], reach, COVER_COS).map(|q| q as usize);
+        hit.is_some_and(|q| cloud.samples.weights[q] > 0.5 * cloud.samples.areas[q])
+    };
+    (0..points.len()).into_par_iter().with_min_len(128).map(is_seen).collect()
 }

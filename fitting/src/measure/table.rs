@@ -5,16 +5,17 @@ use toile_character::{BodyModel, SkinnedMesh};
 use toile_geometry::Mesh;
 
 use crate::{
-    FittingError,
+    BodyFit, FittingError,
     measure::{
         arm,
         definition::MeasureKind,
         extremes, head, leg,
         levels::Levels,
         parts::Side,
+        plausible,
         standing::Standing,
         taken::{BodyMeasure, Taken},
-        trunk,
+        trunk, uncertainty,
     },
 };
 
@@ -72,23 +73,37 @@ pub fn measure_table(model: &BodyModel, body: &SkinnedMesh) -> Result<MeasureTab
 }
 
 impl MeasureTable {
+    /// The table of the body that `fit` found: each measurement with its uncertainty, and with a doubt where it does not go
+    /// with the others as it does among people.
+    #[must_use]
+    pub fn of_fit(mut self, fit: &BodyFit) -> Self {
+        uncertainty::weigh(&mut self.measures, &self.standing, fit);
+        plausible::doubt(&mut self.measures);
+        self
+    }
+
     /// The measurement called `name`, metres.
     pub fn value(&self, name: &str) -> Option<f64> {
         self.measures.iter().find(|m| m.name == name).map(|m| m.value_m)
     }
 
     /// As comma-separated lines: name, kind, centimetres, the height of the tape's middle above the soles in centimetres
-    /// (empty for heights), and the definition; the volume in litres last.
+    /// (empty for heights), the definition, the uncertainty in centimetres, the share of the skin under the tape that was seen
+    /// (0–1), and the doubt; the volume in litres last. What is not known is empty.
     pub fn csv(&self) -> String {
-        let mut out = String::from("measurement,kind,value,unit,height,definition\n");
+        let mut out = String::from("measurement,kind,value,unit,height,definition,uncertainty,seen,doubt\n");
         for m in &self.measures {
             let kind = format!("{:?}", m.kind).to_lowercase();
             let (low, high) = m.path.iter().fold((f64::MAX, f64::MIN), |(l, h), p| (l.min(p[1]), h.max(p[1])));
             let is_shown = !m.path.is_empty() && m.kind != MeasureKind::Height;
             let height = if is_shown { format!("{:.1}", 50.0 * (low + high)) } else { String::new() };
-            let definition = m.definition.replace('"', "\"\"");
-            out += &format!("{},{kind},{:.1},cm,{height},\"{definition}\"\n", m.name, 100.0 * m.value_m);
+            let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+            let uncertainty = m.uncertainty_m.map_or(String::new(), |u| format!("{:.2}", 100.0 * u));
+            let seen = m.seen.map_or(String::new(), |seen| format!("{seen:.2}"));
+            let (definition, doubt) = (quoted(&m.definition), m.doubt.as_deref().map_or(String::new(), quoted));
+            let value = 100.0 * m.value_m;
+            out += &format!("{},{kind},{value:.1},cm,{height},{definition},{uncertainty},{seen},{doubt}\n", m.name);
         }
-        out + &format!("volume,volume,{:.2},l,,\"volume that the skin encloses\"\n", self.volume_l)
+        out + &format!("volume,volume,{:.2},l,,\"volume that the skin encloses\",,,\n", self.volume_l)
     }
 }

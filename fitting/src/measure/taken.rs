@@ -22,6 +22,25 @@ pub struct BodyMeasure {
     pub definition: String,
     /// Where the tape lies on the standing body: corners in metres.
     pub path: Vec<[f64; 3]>,
+    /// Half the interval that holds the true value in 95 of 100 cases, metres; only where a scan was fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty_m: Option<f64>,
+    /// Share of the skin under the tape that the scan shows, 0–1; only where a scan was fitted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seen: Option<f64>,
+    /// Why the value is not to be trusted, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<String>,
+}
+
+impl BodyMeasure {
+    /// The value for people: centimetres with the uncertainty, and `(?)` where it is doubted.
+    pub fn text(&self) -> String {
+        let cm = |metres: f64| format!("{:.1}", 100.0 * metres);
+        let around = self.uncertainty_m.map_or(String::new(), |u| format!(" ± {}", cm(u)));
+        let mark = if self.doubt.is_some() { " (?)" } else { "" };
+        format!("{}{around} cm{mark}", cm(self.value_m))
+    }
 }
 
 /// Measurements in the order in which they were taken.
@@ -43,6 +62,16 @@ impl Taken {
         let Some(tape) = tape else { return };
         let path = tape.path.iter().map(|p| (*p).into()).collect();
         let (kind, definition) = (definition.kind, definition.text());
-        self.0.push(BodyMeasure { name, kind, value_m: tape.length, definition, path });
+        let value_m = tape.length;
+        self.0.push(BodyMeasure {
+            name,
+            kind,
+            value_m,
+            definition,
+            path,
+            uncertainty_m: None,
+            seen: None,
+            doubt: None,
+        });
     }
 }

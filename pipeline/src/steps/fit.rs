@@ -10,7 +10,7 @@ use nalgebra::{Point3, Translation3};
 use serde_json::Value;
 use toile_capture::files::is_there;
 use toile_character::BodyModel;
-use toile_fitting::{BodyFit, FitReport, FitSettings, Mend, Verdict, fit_body, measure_table, rig_scan};
+use toile_fitting::{BodyFit, FitReport, FitSettings, MeasureTable, Mend, Verdict, fit_body, measure_table, rig_scan};
 use toile_geometry::{Mesh, Rigid, color_transfer::closest_colors, ply};
 
 use crate::{
@@ -82,16 +82,19 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
-    fn files(&self, scan: &Mesh, fit: &BodyFit) -> Result<Vec<(PathBuf, Vec<u8>)>, PipelineError> {
+    fn files(
+        &self,
+        scan: &Mesh,
+        fit: &BodyFit,
+        table: &MeasureTable,
+    ) -> Result<Vec<(PathBuf, Vec<u8>)>, PipelineError> {
         let at = |name: &str| self.folder.join(name);
         let scan = fit.mend.apply(scan);
         let weights = rig_scan(&scan, &fit.body, &fit.pose);
         let mut body = fit.posed_body();
         body.colors = closest_colors(&scan, &body.positions, &body.normals);
-        let table = measure_table(self.model, &fit.body);
-        let table = table.map_err(|e| PipelineError::stage(&self.scan, e))?;
         Ok(vec![
-            (at("measurements.json"), json::pretty(&table)?),
+            (at("measurements.json"), json::pretty(table)?),
             (at("measurements.csv"), table.csv().into_bytes()),
             (at("standing.ply"), ply::encode(&table.standing)),
             (at("body.ply"), ply::encode(&body)),
@@ -107,7 +110,7 @@ impl<'a> Fit<'a> {
 impl Step for Fit<'_> {
     type Report = FitReport;
     const NAME: &'static str = "fit";
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
     const SECONDS: f64 = 4.0;
 
     fn label(&self) -> String {
@@ -142,8 +145,10 @@ impl Step for Fit<'_> {
             let reason = format!("no person could be fitted: {}", fit.report.reasons.join("; "));
             return Err(PipelineError::refused(&self.scan, reason));
         }
-        let said = fit.report.reasons.iter().chain(&fit.report.notices);
+        let table = measure_table(self.model, &fit.body).map_err(wrong)?.of_fit(&fit);
+        let doubts = table.measures.iter().filter_map(|m| m.doubt.as_ref());
+        let said = fit.report.reasons.iter().chain(&fit.report.notices).chain(doubts);
         let warnings = said.map(|sentence| format!("body: {sentence}")).collect();
-        Ok(Product::new(self.files(&scan, &fit)?, fit.report, warnings))
+        Ok(Product::new(self.files(&scan, &fit, &table)?, fit.report, warnings))
     }
 }

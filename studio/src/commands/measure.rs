@@ -11,8 +11,10 @@ use crate::{StudioError, commands::fit::Person, outcome::Answer, session::Sessio
 
 const AFTER: &str = "\
 Girths as a taut tape lies, heights above the soles, standing straight. Fits the body first where it has not been fitted.
+The ± holds the true value in 95 of 100 cases; (?) marks a girth that does not go with the others as it does among people.
 measurements.csv has a line for each measurement: name, kind, value, unit, height of the tape's middle above the soles (cm),
-definition; measurements.json also has where each tape lies, and the landmarks. docs/measurements.md explains them all.
+definition, uncertainty (cm), share of the skin under the tape that was seen, and why it is doubted; measurements.json also has
+where each tape lies, and the landmarks. docs/measurements.md explains them all.
 
 Examples:
   toile measure anna
@@ -41,8 +43,7 @@ impl Measure {
 fn measured(fitted: Answer, folder: &Path) -> Result<Answer, StudioError> {
     let table: MeasureTable = read(&folder.join("measurements.json"))?;
     let width = table.measures.iter().map(|m| m.name.len()).max().unwrap_or(0);
-    let mut text: String =
-        table.measures.iter().map(|m| format!("{:width$}  {:6.1} cm\n", m.name, 100.0 * m.value_m)).collect();
+    let mut text: String = table.measures.iter().map(|m| format!("{:width$}  {:>20}\n", m.name, m.text())).collect();
     text += &format!("{:width$}  {:6.1} l\n", "volume", table.volume_l);
     let files = ["measurements.json", "measurements.csv"].map(|f| printable_path(&folder.join(f)));
     text.extend(files.iter().map(|f| format!("{f}\n")));
