@@ -89,7 +89,7 @@ fn every_measure_says_how_it_is_defined_and_the_docs_say_the_same() {
     }
     let lines: Vec<String> = table.csv().lines().map(String::from).collect();
     assert_eq!(lines.len(), table.measures.len() + 2);
-    assert!(lines[1].ends_with(&format!("\"{}\"", table.measures[0].definition)), "{}", lines[1]);
+    assert!(lines[1].ends_with(&format!("\"{}\",,,", table.measures[0].definition)), "{}", lines[1]);
 }
 
 #[test]

@@ -108,9 +108,41 @@ fn a_person_in_another_pose_has_the_same_measures() {
     let truth = measure_table(&model, &model.skinned(&person.beta)).unwrap();
     let scan = common::scanned(&model, &person, 0.001, 5);
     let fit = fit_body(&model, &scan, &FitSettings::default(), &|_| {}).unwrap();
-    let fitted = measure_table(&model, &fit.body).unwrap();
+    let fitted = measure_table(&model, &fit.body).unwrap().of_fit(&fit);
+    let mut within = 0;
     for (a, b) in truth.measures.iter().zip(&fitted.measures) {
+        let off = (a.value_m - b.value_m).abs();
         let tolerance = (0.03 * a.value_m).clamp(0.012, 0.015);
-        assert!((a.value_m - b.value_m).abs() < tolerance, "{}: {} m, fitted {} m", a.name, a.value_m, b.value_m);
+        assert!(off < tolerance, "{}: {} m, fitted {} m", a.name, a.value_m, b.value_m);
+        assert_eq!(b.doubt, None);
+        let claimed = b.uncertainty_m.unwrap_or_else(|| panic!("{} has no uncertainty", b.name));
+        within += usize::from(off <= claimed);
     }
+    let count = fitted.measures.len();
+    assert!(10 * within >= 9 * count, "{within} of {count} measurements are as near as they claim");
+}
+
+#[test]
+fn a_measurement_on_skin_that_was_not_seen_is_less_certain() {
+    let model = BodyModel::load_default().unwrap();
+    let person = common::person(&model, 41, 70.0);
+    let scan = common::scanned(&model, &person, 0.001, 5);
+    let knee =
+        person.pose.joint_positions(&model.skeleton_at(&person.beta))[toile_character::Joint::LeftLowerLeg.index()];
+    let (legless, _) = scan.filter_triangles(|t| {
+        scan.triangles[t].iter().all(|&v| (scan.positions[v as usize].cast::<f64>() - knee).norm() > 0.12)
+    });
+    let table = |scan| {
+        let fit = fit_body(&model, scan, &FitSettings::default(), &|_| {}).unwrap();
+        measure_table(&model, &fit.body).unwrap().of_fit(&fit)
+    };
+    let (whole, torn) = (table(&scan), table(&legless));
+    let of = |table: &toile_fitting::MeasureTable, name: &str| {
+        let m = table.measures.iter().find(|m| m.name == name).unwrap();
+        (m.seen.unwrap(), m.uncertainty_m.unwrap())
+    };
+    let (before, after) = (of(&whole, "left knee girth"), of(&torn, "left knee girth"));
+    assert!(before.0 > 0.9 && after.0 < 0.2, "{before:?} {after:?}");
+    assert!(after.1 > 1.5 * before.1, "{before:?} {after:?}");
+    assert!((of(&whole, "neck girth").1 - of(&torn, "neck girth").1).abs() < 1e-3);
 }
