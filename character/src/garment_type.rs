@@ -21,12 +21,16 @@ pub enum GarmentType {
     Dress,
     /// Jacket, coat: open in front or thick.
     Jacket,
-    /// Anything else: scarf, hat, bag, shoes, gloves.
+    /// Hat, cap, helmet: on the head.
+    Hat,
+    /// Shoes, boots, socks: on both feet.
+    Shoes,
+    /// Anything else: scarf, bag, gloves.
     Other,
 }
 
 /// Words by which people call the types; the first of each is the type's own name.
-const WORDS: [(GarmentType, &[&str]); 6] = [
+const WORDS: [(GarmentType, &[&str]); 8] = [
     (
         GarmentType::Top,
         &["top", "tshirt", "t-shirt", "shirt", "blouse", "pullover", "sweater", "jumper", "hoodie", "vest", "polo"],
@@ -35,7 +39,9 @@ const WORDS: [(GarmentType, &[&str]); 6] = [
     (GarmentType::Skirt, &["skirt", "kilt"]),
     (GarmentType::Dress, &["dress", "gown"]),
     (GarmentType::Jacket, &["jacket", "coat", "blazer", "parka", "anorak", "cardigan"]),
-    (GarmentType::Other, &["other", "scarf", "hat", "cap", "bag", "shoes", "belt", "gloves"]),
+    (GarmentType::Hat, &["hat", "cap", "beanie", "helmet", "headscarf"]),
+    (GarmentType::Shoes, &["shoes", "boots", "sneakers", "trainers", "sandals", "slippers", "socks"]),
+    (GarmentType::Other, &["other", "scarf", "bag", "belt", "gloves"]),
 ];
 
 impl GarmentType {

@@ -20,7 +20,7 @@ pub enum GarmentError {
     /// Labels by the nearest body vertex need a template, and this type of garment has none.
     #[error(
         "garments of type {0} have no template for labels by the nearest body vertex: give the layer a type (top, \
-         trousers, skirt, dress or jacket) in subject.toml, or set labelling = \"graph-cut\""
+         trousers, skirt, dress, jacket, hat or shoes) in subject.toml, or set labelling = \"graph-cut\""
     )]
     NoTemplate(GarmentType),
     /// A number of the settings is outside of its range.

@@ -23,6 +23,9 @@ const LEGS_APART: f32 = 0.2;
 const COVERS_TORSO: f32 = 0.35;
 const COVERS_LEGS: f32 = 0.4;
 const COVERS_PELVIS: f32 = 0.3;
+/// A cap leaves face and neck free, a scarf reaches no higher than the chin; shoes leave at most the ankles free.
+const COVERS_HEAD: f32 = 0.25;
+const COVERS_FEET: f32 = 0.5;
 /// Half the width of the strip along the middle of front and back where a garment may be open, metres.
 const MIDDLE: f32 = 0.04;
 /// Scan further than this from the body says nothing about the front, metres.
@@ -62,6 +65,8 @@ fn fitting_type(covered: &[f32; PART_COUNT], inner_thighs: f32, open_in_front: b
         () if covers_torso => GarmentType::Top,
         () if covers_pelvis && inner_thighs > LEGS_APART => GarmentType::Trousers,
         () if covers_pelvis => GarmentType::Skirt,
+        () if c(BodyPart::Head) > COVERS_HEAD => GarmentType::Hat,
+        () if c(BodyPart::Foot) > COVERS_FEET => GarmentType::Shoes,
         () => GarmentType::Other,
     }
 }
@@ -164,6 +169,8 @@ mod tests {
         let torso = covered(&[(Torso, 0.9), (UpperArm, 0.6)]);
         assert_eq!(fitting_type(&torso, 0.0, false), GarmentType::Top);
         assert_eq!(fitting_type(&torso, 0.0, true), GarmentType::Jacket);
-        assert_eq!(fitting_type(&covered(&[(Head, 0.5)]), 0.0, false), GarmentType::Other);
+        assert_eq!(fitting_type(&covered(&[(Head, 0.5)]), 0.0, false), GarmentType::Hat);
+        assert_eq!(fitting_type(&covered(&[(Foot, 0.9), (LowerLeg, 0.1)]), 0.0, false), GarmentType::Shoes);
+        assert_eq!(fitting_type(&covered(&[(Head, 0.1), (Neck, 0.9)]), 0.0, false), GarmentType::Other);
     }
 }

@@ -14,6 +14,8 @@ pub fn log_odds(garment_type: GarmentType) -> [f32; PART_COUNT] {
         GarmentType::Skirt => [-4.0, -4.0, -1.5, 0.7, -4.0, -4.0, -4.0, 0.5, 0.0, -2.0],
         GarmentType::Dress => [-4.0, -0.5, 0.7, 0.7, 0.0, -0.1, -3.0, 0.5, 0.0, -2.0],
         GarmentType::Jacket => [-2.0, -0.3, 0.3, 0.1, 0.5, 0.3, -2.0, -0.3, -1.0, -3.0],
+        GarmentType::Hat => [0.7, -1.0, -3.0, -4.0, -4.0, -4.0, -4.0, -4.0, -4.0, -4.0],
+        GarmentType::Shoes => [-4.0, -4.0, -4.0, -4.0, -4.0, -4.0, -4.0, -3.0, -0.3, 0.7],
         GarmentType::Other => [0.0; PART_COUNT],
     }
 }
@@ -28,15 +30,17 @@ pub fn covered_parts(garment_type: GarmentType) -> Option<&'static [BodyPart]> {
         GarmentType::Skirt => Some(&[P::Pelvis, P::UpperLeg]),
         GarmentType::Dress => Some(&[P::Torso, P::Pelvis, P::UpperLeg]),
         GarmentType::Jacket => Some(&[P::Torso, P::Pelvis, P::UpperArm, P::LowerArm]),
+        GarmentType::Hat => Some(&[P::Head]),
+        GarmentType::Shoes => Some(&[P::Foot]),
         GarmentType::Other => None,
     }
 }
 
-/// How thick the cloth of a type of garment commonly is, metres: shirting and knits up to 1 mm, a lined jacket or a scarf
-/// about 2 mm. Scans do not show it: the noise of sensors is as large.
+/// How thick the cloth of a type of garment commonly is, metres: shirting and knits up to 1 mm, a lined jacket, a scarf, a
+/// felt hat or shoe leather about 2 mm. Scans do not show it: the noise of sensors is as large.
 pub fn cloth_thickness(garment_type: GarmentType) -> f32 {
     match garment_type {
         GarmentType::Top | GarmentType::Trousers | GarmentType::Skirt | GarmentType::Dress => 0.001,
-        GarmentType::Jacket | GarmentType::Other => 0.002,
+        GarmentType::Jacket | GarmentType::Hat | GarmentType::Shoes | GarmentType::Other => 0.002,
     }
 }

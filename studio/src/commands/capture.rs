@@ -38,7 +38,7 @@ pub struct Capture {
     /// The addition of the take, without a number: body, trousers, shirt, ...
     #[arg(long, value_name = "NAME")]
     layer: String,
-    /// The type of the garment: top, trousers, skirt, dress, jacket, other
+    /// The type of the garment: top, trousers, skirt, dress, jacket, hat, shoes, other
     #[arg(long = "type", value_name = "TYPE")]
     garment: Option<GarmentType>,
     /// Where frames come from

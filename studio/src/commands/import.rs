@@ -38,7 +38,7 @@ pub struct Import {
     /// Layout of the folder (guessed when not said)
     #[arg(long, value_name = "F")]
     format: Option<Format>,
-    /// The type of the garment: top, trousers, skirt, dress, jacket, other
+    /// The type of the garment: top, trousers, skirt, dress, jacket, hat, shoes, other
     #[arg(long = "type", value_name = "TYPE")]
     garment: Option<GarmentType>,
     /// Replace the layer's take; the old one is kept under takes/rejected/
