@@ -7,7 +7,7 @@
 //! - [`bvh::Bvh`]: closest point, ray and overlap queries over a mesh's triangles;
 //! - [`raster::rasterize`]: the triangles that a camera sees;
 //! - [`topology`]: edges, neighbours, boundary loops, components; [`areas`], [`laplacian`], [`edge_distance`],
-//!   [`surface_solve`]: measures and equations on a surface;
+//!   [`surface_solve`]: measures and equations on a surface; [`section`]: what a plane cuts;
 //! - [`statistics`]: medians, quantiles, robust spreads; [`lanes`]: vector instructions chosen at run time;
 //! - [`ply`], [`obj`]: files.
 //!
@@ -54,6 +54,7 @@ pub mod predicates;
 pub mod raster;
 pub mod remesh;
 pub mod rims;
+pub mod section;
 pub mod smooth;
 pub mod statistics;
 pub mod surface_solve;

@@ -1,11 +1,12 @@
 //! Height and scored girths of a body: perimeters of the convex hulls of the trunk's sections.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3, Vector3};
 use serde::Serialize;
 use toile_character::Region;
 use toile_geometry::{
     Mesh,
     hull::{area_and_perimeter, convex_hull},
+    section::section_pieces,
 };
 
 /// Distance between two sections that are tried, as a share of stature.
@@ -51,19 +52,10 @@ pub fn girths(body: &Mesh, regions: &[Region]) -> Option<Girths> {
     Some(Girths { chest: scan(0.70, 0.735, 1.0)?, waist: scan(0.57, 0.66, -1.0)?, hip: scan(0.47, 0.55, 1.0)? })
 }
 
-/// Perimeter of the convex hull of the section at height `y`.
+/// Perimeter of the convex hull of the largest piece of the section at height `y`: below the crotch that is one leg.
 fn girth_at(body: &Mesh, y: f64) -> Option<f64> {
-    let mut points = Vec::new();
-    for t in &body.triangles {
-        let corners = t.map(|v| body.positions[v as usize].cast::<f64>());
-        for k in 0..3 {
-            let (a, b) = (corners[k], corners[(k + 1) % 3]);
-            if (a.y < y) != (b.y < y) {
-                let f = (y - a.y) / (b.y - a.y);
-                points.push(Point2::new(a.x + f * (b.x - a.x), a.z + f * (b.z - a.z)));
-            }
-        }
-    }
-    let hull = convex_hull(points);
-    (hull.len() > 2).then(|| area_and_perimeter(&hull).1)
+    let flat = |piece: &Vec<Point3<f64>>| piece.iter().map(|p| Point2::new(p.x, p.z)).collect();
+    let pieces = section_pieces(&body.positions, &body.triangles, &Point3::new(0.0, y, 0.0), &Vector3::y());
+    let hulls = pieces.iter().map(|piece| area_and_perimeter(&convex_hull(flat(piece))));
+    hulls.filter(|(area, _)| *area > 0.0).reduce(|a, b| if b.0 > a.0 { b } else { a }).map(|(_, perimeter)| perimeter)
 }

@@ -1,7 +1,10 @@
 //! Plane sections of a part of the body, and how a tape lies around and along them.
 
 use nalgebra::{Point2, Point3, Vector3};
-use toile_geometry::hull::{area_and_perimeter, convex_hull};
+use toile_geometry::{
+    hull::{area_and_perimeter, convex_hull},
+    section::section_pieces,
+};
 
 /// A plane through `point` with unit `normal`.
 #[derive(Debug, Clone, Copy)]
@@ -37,10 +40,6 @@ impl Plane {
         direction.try_normalize(1e-9).map(|normal| Self { point, normal })
     }
 
-    fn height(&self, p: &Point3<f32>) -> f64 {
-        (p.cast::<f64>() - self.point).dot(&self.normal)
-    }
-
     /// Two unit vectors in the plane; for a horizontal one +X and +Z.
     fn axes(&self) -> (Vector3<f64>, Vector3<f64>) {
         let seed = if self.normal.x.abs() < 0.9 { Vector3::x() } else { Vector3::z() };
@@ -56,44 +55,7 @@ const BULGE: f64 = 0.3;
 impl Skin<'_> {
     /// Points of each connected piece of the section by `plane`. A part's own rim is open, so pieces may be too.
     pub fn pieces(&self, plane: &Plane) -> Vec<Vec<Point3<f64>>> {
-        let heights: Vec<f64> = self.positions.iter().map(|p| plane.height(p)).collect();
-        let segments = self.crossed_edges(&heights);
-        let mut edges: Vec<[u32; 2]> = segments.iter().flatten().copied().collect();
-        edges.sort_unstable();
-        edges.dedup();
-        let index = |e: &[u32; 2]| edges.binary_search(e).unwrap_or(0) as u32;
-        let links: Vec<[u32; 3]> = segments.iter().map(|[a, b]| [index(a), index(b), index(b)]).collect();
-        let (labels, count) = toile_geometry::topology::vertex_components(edges.len(), &links);
-        let mut pieces = vec![Vec::new(); count];
-        for (&edge, label) in edges.iter().zip(labels) {
-            pieces[label as usize].push(self.crossing(edge, &heights));
-        }
-        pieces
-    }
-
-    /// The two edges of each triangle that the plane crosses.
-    fn crossed_edges(&self, heights: &[f64]) -> Vec<[[u32; 2]; 2]> {
-        let side = |v: u32| heights[v as usize] > 0.0;
-        let mut segments = Vec::new();
-        for t in self.triangles {
-            if side(t[0]) == side(t[1]) && side(t[1]) == side(t[2]) {
-                continue;
-            }
-            let mut crossed = (0..3)
-                .map(|k| [t[k].min(t[(k + 1) % 3]), t[k].max(t[(k + 1) % 3])])
-                .filter(|e| side(e[0]) != side(e[1]));
-            if let (Some(a), Some(b)) = (crossed.next(), crossed.next()) {
-                segments.push([a, b]);
-            }
-        }
-        segments
-    }
-
-    fn crossing(&self, [a, b]: [u32; 2], heights: &[f64]) -> Point3<f64> {
-        let (p, q) = (self.positions[a as usize].cast::<f64>(), self.positions[b as usize].cast::<f64>());
-        let (h, k) = (heights[a as usize], heights[b as usize]);
-        let t = if (h - k).abs() > 1e-12 { (h / (h - k)).clamp(0.0, 1.0) } else { 0.5 };
-        p + (q - p) * t
+        section_pieces(self.positions, self.triangles, &plane.point, &plane.normal)
     }
 
     /// The tape around everything that the plane cuts; `None` where it cuts nothing.
