@@ -17,7 +17,9 @@ use crate::{StudioError, commands::reach::must_exist, outcome::Answer, session::
 
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
-Formats: toile-folder (depth/, color/, camera.json, timestamps.txt), tum, uva, seven-scenes, mcap; guessed when not said.
+Formats, guessed when not said: toile-folder (depth/, color/, camera.json, timestamps.txt; also Open3D's), tum, uva,
+seven-scenes (also 3DMatch), redwood, associated (ICL-NUIM), stray-scanner, freenect (fakenect dumps), record3d (.r3d),
+sens (BundleFusion, ScanNet), bag (ROS 1, librealsense), ros-mcap (ROS 1 and 2), mcap.
 
 Finished scans become takes, too: PLY, OBJ, GLB, glTF and STL, with pictures or vertex colours, in any unit, any axis up.
 
