@@ -20,7 +20,7 @@ const NOT_READ: [(&[u8], &str); 3] = [
     ),
     (
         b"\x1a\x45\xdf\xa3",
-        "is a Matroska recording (.mkv, as of Azure Kinect and Orbbec), which is not read; export its \
+        "is a Matroska recording (.mkv, as k4arecorder and its like write), which is not read; export its \
                            pictures as PNG with a camera.json",
     ),
 ];

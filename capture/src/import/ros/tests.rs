@@ -180,6 +180,77 @@ fn the_first_layout_of_librealsense_is_read() {
     assert_eq!((source.rig().sensors[0].depth.fx, source.rig().sensors[0].color), (7.0, None));
 }
 
+/// A message of ROS 2, aligned as CDR asks.
+#[derive(Default)]
+struct Cdr(Vec<u8>);
+
+impl Cdr {
+    fn put<const N: usize>(mut self, bytes: [u8; N]) -> Self {
+        self.0.resize(self.0.len().next_multiple_of(N), 0);
+        self.0.extend(bytes);
+        self
+    }
+
+    fn text(self, text: &str) -> Self {
+        let mut next = self.put((text.len() as u32 + 1).to_le_bytes());
+        next.0.extend(text.bytes().chain([0]));
+        next
+    }
+
+    fn header(self, seconds: u32, frame: &str) -> Self {
+        self.put(seconds.to_le_bytes()).put(0_u32.to_le_bytes()).text(frame)
+    }
+
+    fn done(self) -> Vec<u8> {
+        [vec![0, 1, 0, 0], self.0].concat()
+    }
+}
+
+fn cdr_image(seconds: u32, encoding: &str, step: u32, data: &[u8]) -> Vec<u8> {
+    let size = Cdr::default().header(seconds, "optical").put(2_u32.to_le_bytes()).put(4_u32.to_le_bytes());
+    let mut image = size.text(encoding).put([0]).put(step.to_le_bytes()).put((data.len() as u32).to_le_bytes());
+    image.0.extend(data);
+    image.done()
+}
+
+fn cdr_info() -> Vec<u8> {
+    let mut info = Cdr::default().header(0, "optical").put(2_u32.to_le_bytes()).put(4_u32.to_le_bytes());
+    info = info.text("plumb_bob").put(0_u32.to_le_bytes());
+    for value in [5.0, 0.0, 2.0, 0.0, 5.0, 1.0, 0.0, 0.0, 1.0].into_iter().chain([0.0; 21]) {
+        info = info.put(f64::to_le_bytes(value));
+    }
+    [0; 6].iter().fold(info, |info, word: &u32| info.put(word.to_le_bytes())).put([0]).done()
+}
+
+#[test]
+fn mcap_of_ros_1_and_ros_2_is_read_and_told_from_other_mcap() {
+    let dir = tempfile::tempdir().unwrap();
+    let ros1 = [image(10, "optical", "16UC1", 8, &depth_bytes(1000)), info("optical", 5.0, "plumb_bob", &[])];
+    let ros2 = [cdr_image(10, "16UC1", 8, &depth_bytes(1000)), cdr_info()];
+    for (encoding, infix, [depth, camera]) in [("ros1", "/", ros1), ("cdr", "/msg/", ros2)] {
+        let mut writer = ::mcap::Writer::new(std::io::Cursor::new(Vec::new())).unwrap();
+        for (k, (topic, kind, data)) in
+            [("/cam/depth/camera_info", "CameraInfo", camera), ("/cam/depth/image_raw", "Image", depth)]
+                .iter()
+                .enumerate()
+        {
+            let schema = writer.add_schema(&format!("sensor_msgs{infix}{kind}"), "ros2msg", b"x").unwrap();
+            let channel_id = writer.add_channel(schema, topic, encoding, &BTreeMap::new()).unwrap();
+            let header =
+                ::mcap::records::MessageHeader { channel_id, sequence: k as u32, log_time: 7, publish_time: 7 };
+            writer.write_to_known_channel(&header, data).unwrap();
+        }
+        writer.finish().unwrap();
+        let path = dir.path().join(format!("{encoding}.mcap"));
+        fs::write(&path, writer.into_inner().into_inner()).unwrap();
+        assert_eq!(crate::import::guess(&path).unwrap(), crate::import::Format::RosMcap);
+        let mut source = open_mcap(&path).unwrap();
+        assert_eq!(source.rig().sensors[0].depth.fx, 5.0);
+        let frame = source.next_frame().unwrap().unwrap();
+        assert_eq!((frame.device_time_ns, frame.depth.unwrap().values[7]), (10_000_000_000, 1007), "{encoding}");
+    }
+}
+
 #[test]
 fn a_real_recording_of_librealsense_is_read() {
     let Some(folder) = toile_outside::data("real/recordings/librealsense_bag") else { return };
