@@ -136,6 +136,11 @@ impl Import {
         let survey = ScanSurvey::new(&self.folder, self.unit, self.up)?;
         session.progress.end();
         let mut subject = LockedSubject::open_or_create(&self.subject)?;
+        let done = subject.completed(&self.layer, &source_name(&self.folder)).filter(|_| !self.retake);
+        if let Some(layer) = done {
+            // An earlier run of this very command was killed after the take was whole.
+            return Ok(scan_answer(&survey, &subject.take_path(layer), None));
+        }
         match self.copy_scan(&mut subject) {
             Ok((take, kept)) => {
                 survey.sentences.iter().chain(&subject.remarks()).for_each(|remark| session.progress.remark(remark));
