@@ -273,7 +273,8 @@ mod tests {
         for packing in [0, 1] {
             let mut source = opened(&sens(2, packing, &[1_000_000, 1_050_000])).unwrap();
             let sensor = source.rig().sensors[0].clone();
-            assert_eq!((sensor.depth.fx, sensor.depth.cx, sensor.color.unwrap().fx), (5.0, 1.5, 9.0));
+            let [depth, color] = [sensor.depth, sensor.color.unwrap()];
+            assert_eq!((depth.fx, depth.cx, depth.cy, color.fx, color.cy), (5.0, 1.5, 0.5, 9.0, 2.0));
             assert!((sensor.fps - 20.0).abs() < 1e-9 && source.remarks().is_empty());
             source.next_frame().unwrap();
             let frame = source.next_frame().unwrap().unwrap();
