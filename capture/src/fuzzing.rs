@@ -17,6 +17,11 @@ pub fn camera_file(text: &str) {
     import::parse_calibration(text);
 }
 
+/// Reads pictures, messages and lists of other programs' recordings.
+pub fn recording(bytes: &[u8]) {
+    import::parse_recording(bytes);
+}
+
 /// Reads `subject.toml` and `pending.toml`.
 pub fn subject(text: &str) {
     subject::parse(text);

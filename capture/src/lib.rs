@@ -82,6 +82,6 @@ pub use recording::{
 };
 pub use rig::{DeviceIdentity, Rig, Sensor};
 pub use source::Source;
-pub use subject::{Layer, LockedSubject, PendingTake, Subject, SubjectLock};
+pub use subject::{Layer, LockedSubject, PendingTake, ScanTake, Subject, SubjectLock};
 pub use tick_clock::TickClock;
 pub use trajectory::TimedPose;

@@ -158,7 +158,7 @@ fn formats_print_and_parse() {
     for format in Format::ALL {
         assert_eq!(format.to_string().parse::<Format>(), Ok(format));
     }
-    assert!("bag".parse::<Format>().unwrap_err().contains("seven-scenes"));
+    assert!("video".parse::<Format>().unwrap_err().contains("seven-scenes"));
 }
 
 struct Real {

@@ -16,6 +16,9 @@ use crate::{GeometryError, Mesh, file::read_limited};
 /// Maximum size of a file, bytes: a scan of twelve million vertices.
 const MAX_BYTES: u64 = 1 << 30;
 
+/// Where in a picture the three corners of a triangle lie.
+pub type TextureCorners = [[f32; 2]; 3];
+
 /// Reads a PLY file.
 ///
 /// # Errors
@@ -30,18 +33,30 @@ pub fn read(path: &Path) -> Result<Mesh, GeometryError> {
 /// # Errors
 /// A sentence that says what is wrong.
 pub fn decode(bytes: &[u8]) -> Result<Mesh, String> {
+    decode_textured(bytes).map(|(mesh, _)| mesh)
+}
+
+/// As [`decode`], with the texture coordinates that the corners of each triangle have (`texcoord` of the faces, as MeshLab
+/// writes them); empty where not every face has them.
+///
+/// # Errors
+/// As [`decode`].
+pub fn decode_textured(bytes: &[u8]) -> Result<(Mesh, Vec<TextureCorners>), String> {
     let (header, body) = header::parse(bytes)?;
     let mut numbers = numbers::over(header.format, body)?;
-    let mut mesh = Mesh::default();
+    let (mut mesh, mut texture) = (Mesh::default(), Vec::new());
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => elements::read_vertices(element, numbers.as_mut(), &mut mesh)?,
-            "face" => elements::read_faces(element, numbers.as_mut(), &mut mesh)?,
+            "face" => elements::read_faces(element, numbers.as_mut(), &mut mesh, &mut texture)?,
             _ => elements::skip(element, numbers.as_mut())?,
         }
     }
     mesh.validate().map_err(|e| e.to_string())?;
-    Ok(mesh)
+    if texture.len() != mesh.triangles.len() {
+        texture.clear();
+    }
+    Ok((mesh, texture))
 }
 
 /// Writes a mesh to `path` in place. Stages write through the pipeline's own whole-or-nothing writer and [`encode`].

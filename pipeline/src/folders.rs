@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use toile_capture::files::is_there;
+
 /// A subject's folder and what is in it.
 #[derive(Debug, Clone)]
 pub struct Folders {
@@ -23,6 +25,17 @@ impl Folders {
     /// The recording of a take.
     pub fn take(&self, layer: &str) -> PathBuf {
         self.root.join("takes").join(format!("{layer}.mcap"))
+    }
+
+    /// The folder of a take that is a finished scan; `None` where it is a recording.
+    pub fn scan_take(&self, layer: &str) -> Option<PathBuf> {
+        let folder = self.root.join("takes").join(format!("{layer}.scan"));
+        (!is_there(&self.take(layer)) && folder.is_dir()).then_some(folder)
+    }
+
+    /// The camera's way in the scan of a take; a finished scan has none.
+    pub fn trajectory(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("trajectory.tum")
     }
 
     /// Everything that can be built again.

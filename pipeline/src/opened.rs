@@ -25,8 +25,9 @@ impl Opened {
     /// # Errors
     /// [`PipelineError`] that names the file or field that is missing or wrong.
     pub fn new(recording: &Path, format: Option<Format>) -> Result<Self, PipelineError> {
-        if !recording.is_file() || format.is_some_and(|f| f != Format::Mcap) {
-            let source = import::open(recording, format)?;
+        let format = format.map_or_else(|| import::guess(recording), Ok)?;
+        if format != Format::Mcap || !recording.is_file() {
+            let source = import::open(recording, Some(format))?;
             return Ok(Self { lost: source.remarks(), source, dropped: 0 });
         }
         let replay = Replay::open(recording)?;

@@ -14,7 +14,9 @@ use crate::{
     options::{Goal, MotionChoice, Options},
     settings, stale,
     step::Step,
-    steps::{cut::Cut, export::Export, fit::Fit, fuse::Fuse, page::Page, pose::PoseUnder, stack::Stack},
+    steps::{
+        cut::Cut, export::Export, fit::Fit, fuse::Fuse, page::Page, pose::PoseUnder, read_scan::ReadScan, stack::Stack,
+    },
     summary::{Measured, Summary, TakeSummary},
 };
 
@@ -31,8 +33,8 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
     observer.plan(seconds(&run, goal));
     let mut summary = Summary { layers: vec!["body".into()], ..Summary::default() };
     for layer in &run.layers {
-        let fuse = summary.hear(run.step(&Fuse::of_layer(&run, layer))?);
-        summary.decided.takes.push(TakeSummary { layer: layer.clone(), fuse, pose: None, cut: None });
+        let take = to_scan(&run, layer, &mut summary)?;
+        summary.decided.takes.push(take);
     }
     if goal == Goal::Scans {
         summary.files = run.layers.iter().map(|l| run.folders.scan(l)).collect();
@@ -42,6 +44,20 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
     summary.notes.extend(stale::note(&run.folders, goal));
     summary.notes.extend(run.remarks());
     Ok(summary)
+}
+
+/// The scan of one take: fused from its recording, or read from a finished one.
+fn to_scan(run: &Run, layer: &str, summary: &mut Summary) -> Result<TakeSummary, PipelineError> {
+    let mut take = TakeSummary::of(layer);
+    match ReadScan::of_layer(run, layer) {
+        None => take.fuse = Some(summary.hear(run.step(&Fuse::of_layer(run, layer))?)),
+        Some(step) => {
+            take.read = Some(summary.hear(run.step(&step)?));
+            // Of a recording that the scan replaced.
+            remove(&run.folders.trajectory(layer))?;
+        }
+    }
+    Ok(take)
 }
 
 /// From the scans to the body, and on.

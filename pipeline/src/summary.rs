@@ -11,7 +11,7 @@ use toile_garments::ExtractionReport;
 use crate::{
     PipelineError, Record, json,
     step::Remarks,
-    steps::{export::Exported, pose::PoseReport, stack::Stacked},
+    steps::{export::Exported, pose::PoseReport, read_scan::ScanReport, stack::Stacked},
 };
 
 /// The results of a run, and remarks about them.
@@ -60,12 +60,21 @@ pub struct Decided {
 pub struct TakeSummary {
     /// Folder name of the layer.
     pub layer: String,
-    /// The scan.
-    pub fuse: FusionReport,
+    /// How its recording was fused; `None` where the take is a finished scan.
+    pub fuse: Option<FusionReport>,
+    /// How a finished scan was read; `None` where the take is a recording.
+    pub read: Option<ScanReport>,
     /// The body in it, where the take is dressed.
     pub pose: Option<PoseReport>,
     /// The garment.
     pub cut: Option<ExtractionReport>,
+}
+
+impl TakeSummary {
+    /// Of a take of which nothing is decided yet.
+    pub(crate) fn of(layer: &str) -> Self {
+        Self { layer: layer.to_string(), fuse: None, read: None, pose: None, cut: None }
+    }
 }
 
 impl Summary {
@@ -86,7 +95,8 @@ impl Decided {
     pub fn by_step(&self) -> Result<Map<String, Value>, PipelineError> {
         let mut all = Map::new();
         for take in &self.takes {
-            all.insert(format!("{}/fuse", take.layer), json::plain(&take.fuse)?);
+            insert(&mut all, format!("{}/fuse", take.layer), take.fuse.as_ref())?;
+            insert(&mut all, format!("{}/read", take.layer), take.read.as_ref())?;
             insert(&mut all, format!("{}/pose", take.layer), take.pose.as_ref())?;
             insert(&mut all, format!("{}/cut", take.layer), take.cut.as_ref())?;
         }

@@ -1,63 +1,15 @@
 //! Which layout a folder has, and opening it.
 
-use std::{
-    fmt,
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::path::{Path, PathBuf};
 
 use super::{
-    camera_file, folder,
+    associated, camera_file, folder,
+    format::{Format, names},
+    freenect,
     inventory::{Entry, FolderSource, Listing},
-    seven_scenes, tum, uva,
+    record3d, redwood, ros, sens, seven_scenes, sniff, stray, tum, uva,
 };
 use crate::{CaptureError, Replay, Source, printable};
-
-/// The layouts that can be imported.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// `depth/`, `color/`, `camera.json`, `timestamps.txt`.
-    ToileFolder,
-    /// TUM RGB-D.
-    Tum,
-    /// University of Amsterdam's person turning before a sensor.
-    Uva,
-    /// Microsoft 7-Scenes.
-    SevenScenes,
-    /// A recording of Toile's own, or of another program with Foxglove's messages.
-    Mcap,
-}
-
-impl Format {
-    /// Every format, in the order in which they are listed to people.
-    pub const ALL: [Self; 5] = [Self::ToileFolder, Self::Tum, Self::Uva, Self::SevenScenes, Self::Mcap];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ToileFolder => "toile-folder",
-            Self::Tum => "tum",
-            Self::Uva => "uva",
-            Self::SevenScenes => "seven-scenes",
-            Self::Mcap => "mcap",
-        }
-    }
-}
-
-impl fmt::Display for Format {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Format {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.into_iter().find(|format| format.name() == text);
-        known.ok_or_else(|| format!("`{text}` is not a format; choose one of {}", names()))
-    }
-}
 
 /// How to import.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -86,10 +38,15 @@ pub fn open_with(path: &Path, options: &ImportOptions) -> Result<Box<dyn Source>
         Some(format) => format,
         None => guess(path)?,
     };
-    if format == Format::Mcap {
-        return Ok(Box::new(Replay::open(path)?));
-    }
-    Ok(Box::new(open_folder(path, format, options.apply_mask)?))
+    Ok(match format {
+        Format::Mcap => Box::new(Replay::open(path)?),
+        Format::Bag => Box::new(ros::open_bag(path)?),
+        Format::RosMcap => Box::new(ros::open_mcap(path)?),
+        Format::Sens => Box::new(sens::open(path)?),
+        Format::Record3d => Box::new(record3d::open(path)?),
+        Format::Freenect => Box::new(freenect::open(path, &Listing::read(path)?)?),
+        _ => Box::new(open_folder(path, format, options.apply_mask)?),
+    })
 }
 
 /// The files that decide what [`open`] gives of a folder: its own, its calibration's, and its frames' images.
@@ -97,7 +54,11 @@ pub fn open_with(path: &Path, options: &ImportOptions) -> Result<Box<dyn Source>
 /// # Errors
 /// As [`open`].
 pub fn files(path: &Path) -> Result<Vec<PathBuf>, CaptureError> {
-    let source = open_folder(path, guess(path)?, false)?;
+    let format = guess(path)?;
+    if matches!(format, Format::Record3d | Format::Freenect) {
+        return all_files(path);
+    }
+    let source = open_folder(path, format, false)?;
     let own = Listing::read(path)?.files.into_iter().map(|name| path.join(name));
     let of_entry = |entry: &Entry| [entry.depth.clone(), entry.color.clone(), entry.mask.clone()];
     let images = source.entries().iter().flat_map(of_entry).flatten();
@@ -108,22 +69,45 @@ pub fn files(path: &Path) -> Result<Vec<PathBuf>, CaptureError> {
     Ok(files)
 }
 
+/// All files of a folder and of the folders in it.
+fn all_files(path: &Path) -> Result<Vec<PathBuf>, CaptureError> {
+    let listing = Listing::read(path)?;
+    let mut files: Vec<PathBuf> =
+        listing.files.iter().map(|name| path.join(name)).filter(|file| file.is_file()).collect();
+    for folder in &listing.folders {
+        let inner = path.join(folder);
+        files.extend(Listing::read(&inner)?.files.iter().map(|name| inner.join(name)).filter(|file| file.is_file()));
+    }
+    files.sort();
+    Ok(files)
+}
+
 /// Guesses a folder's format from the names in it.
 ///
 /// # Errors
 /// [`CaptureError`] where there is no such folder or nothing in it is known; the message lists what is.
 pub fn guess(path: &Path) -> Result<Format, CaptureError> {
     if path.exists() && !path.is_dir() {
-        return Ok(Format::Mcap);
+        return sniff::file(path);
     }
     let listing = Listing::read(path)?;
-    guess_listing(&listing).ok_or_else(|| unknown(path, &listing))
+    guess_listing(path, &listing).ok_or_else(|| unknown(path, &listing))
 }
 
-fn guess_listing(listing: &Listing) -> Option<Format> {
+fn guess_listing(path: &Path, listing: &Listing) -> Option<Format> {
     let any = |test: &dyn Fn(&str) -> bool| listing.files.iter().any(|name| test(name));
     if any(&|name| name == "depth.txt") {
         Some(Format::Tum)
+    } else if associated::list_in(listing).is_some() {
+        Some(Format::Associated)
+    } else if stray::is_here(listing) {
+        Some(Format::StrayScanner)
+    } else if freenect::is_here(listing) {
+        Some(Format::Freenect)
+    } else if any(&|name| name == "metadata") && listing.folders.iter().any(|name| name == "rgbd") {
+        Some(Format::Record3d)
+    } else if redwood::is_named_so(path) {
+        Some(Format::Redwood)
     } else if listing.folders.iter().any(|name| name == "depth") {
         Some(Format::ToileFolder)
     } else if any(&|name| seven_scenes::is_depth(name)) {
@@ -144,15 +128,18 @@ pub(super) fn open_folder(path: &Path, format: Format, apply_mask: bool) -> Resu
         Format::Tum => tum::open(path, &listing),
         Format::Uva => uva::open(path, &listing, apply_mask),
         Format::SevenScenes => seven_scenes::open(path, &listing),
-        Format::Mcap => Err(CaptureError::format(
-            path,
-            "is a folder, not a recording; leave --format out, or name the folder's layout",
-        )),
+        Format::Redwood => redwood::open(path, &listing),
+        Format::Associated => associated::open(path, &listing),
+        Format::StrayScanner => stray::open(path, &listing),
+        _ => Err(CaptureError::format(path, "is not read as a folder; leave --format out, or name its layout")),
     }
 }
 
 fn unknown(path: &Path, listing: &Listing) -> CaptureError {
-    let inside = |name: &&String| Listing::read(&path.join(name)).is_ok_and(|inner| guess_listing(&inner).is_some());
+    let inside = |name: &&String| {
+        let inner = path.join(name);
+        Listing::read(&inner).is_ok_and(|listing| guess_listing(&inner, &listing).is_some())
+    };
     let hints: Vec<_> = listing.folders.iter().filter(inside).map(String::as_str).collect();
     let hint = if hints.is_empty() {
         format!("name its layout with --format ({}), or look at what is in the folder", names())
@@ -160,8 +147,4 @@ fn unknown(path: &Path, listing: &Listing) -> CaptureError {
         format!("did you mean a folder in it: {}?", printable(&hints.join(", ")))
     };
     CaptureError::format(path, format!("its layout of depth images is not known; {hint}"))
-}
-
-fn names() -> String {
-    Format::ALL.map(Format::name).join(", ")
 }

@@ -6,6 +6,14 @@
 //! | `tum` | TUM RGB-D: `depth.txt`, `rgb.txt`; or pairs such as `X_depth.png`, `X_color.png` |
 //! | `uva` | `N.jpg`, `N_depth.png`, `N_mask.jpg`, `N_camera.xml` |
 //! | `seven-scenes` | `frame-N.color.jpg`, `frame-N.depth.png`, `frame-N.pose.txt`, `camera-intrinsics.txt` |
+//! | `redwood` | `depth/NNNNNNN-TTTTTTTTTTTT.png`, `rgb/` or `image/` likewise |
+//! | `associated` | `associations.txt` (ICL-NUIM, TUM RGB-D): `t depth t colour` |
+//! | `stray-scanner` | `camera_matrix.csv`, `odometry.csv`, `depth/NNNNNN.png` |
+//! | `freenect` | `INDEX.txt`, `d-TIME-STAMP.pgm`, `r-TIME-STAMP.ppm` |
+//! | `record3d` | an `.r3d` archive, or `metadata` and `rgbd/N.depth`, `rgbd/N.jpg` |
+//! | `sens` | BundleFusion and ScanNet |
+//! | `bag` | a ROS 1 bag with `sensor_msgs`, as librealsense records, too |
+//! | `ros-mcap` | MCAP with `sensor_msgs` of ROS 1 or ROS 2 |
 //! | `mcap` | a recording of Toile's own, or of another program with Foxglove's messages |
 //!
 //! Nothing but names and calibration is read on opening; each frame is read when it is asked for. Frames pair by their
@@ -20,21 +28,35 @@
 //! # Ok::<(), toile_capture::CaptureError>(())
 //! ```
 
+#[cfg(test)]
+mod archives;
+mod associated;
 mod camera_file;
 mod folder;
+mod format;
+mod freenect;
 mod images;
 mod inventory;
 mod layout;
 mod number_list;
 mod poses;
 mod record;
+mod record3d;
+mod redwood;
 mod rigid;
+mod ros;
+mod sens;
 mod seven_scenes;
+mod sniff;
+mod stored;
+mod stray;
 mod timed;
 mod tum;
 mod uva;
+mod zip;
 
-pub use layout::{Format, ImportOptions, files, guess, open, open_with};
+pub use format::Format;
+pub use layout::{ImportOptions, files, guess, open, open_with};
 pub(crate) use number_list::number_list;
 pub use poses::reference_poses;
 pub use record::{ImportReport, record};
@@ -42,6 +64,15 @@ pub use record::{ImportReport, record};
 /// Reads the text of a calibration file as each reader of one would; for `fuzz/`.
 pub(crate) fn parse_calibration(text: &str) {
     let _ = (camera_file::parse(text), uva::parse_matrix::<9>(text, "intrinsic"));
+}
+
+/// Reads pictures, messages and lists of other programs' recordings; for `fuzz/`.
+pub(crate) fn parse_recording(bytes: &[u8]) {
+    ros::parse(bytes);
+    sens::parse(bytes);
+    zip::parse(bytes);
+    record3d::parse(bytes);
+    freenect::parse(bytes);
 }
 
 /// Reads a file's name; for `fuzz/`.

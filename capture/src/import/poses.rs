@@ -6,8 +6,9 @@ use nalgebra::{Matrix3, Matrix4, Vector3};
 use toile_geometry::Rigid;
 
 use super::{
+    format::Format,
     inventory::FolderSource,
-    layout::{Format, guess, open_folder},
+    layout::{guess, open_folder},
     rigid::{rigid_from_matrix, rigid_from_parts},
     uva,
 };
@@ -28,10 +29,10 @@ use crate::{
 pub fn reference_poses(folder: &Path) -> Result<Option<Vec<TimedPose>>, CaptureError> {
     let format = guess(folder)?;
     match format {
-        Format::Mcap => Ok(None),
         Format::Uva => by_frame(&open_folder(folder, format, false)?, uva_pose).map(Some),
         Format::SevenScenes => by_frame(&open_folder(folder, format, false)?, seven_scenes_pose).map(Some),
         Format::ToileFolder | Format::Tum => beside(folder, format),
+        _ => Ok(None),
     }
 }
 

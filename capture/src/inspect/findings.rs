@@ -37,7 +37,7 @@ pub struct TakeInspection {
     pub name: String,
     /// The type of the garment that it shows, where it is known.
     pub garment: Option<String>,
-    /// `mcap`, or the layout of a folder.
+    /// `mcap`, the layout of a folder, or `scan`.
     pub format: String,
     /// Size of the recording, bytes; 0 for folders.
     pub bytes: u64,
@@ -47,6 +47,9 @@ pub struct TakeInspection {
     pub duration_s: f64,
     /// Its sensors.
     pub sensors: Vec<SensorInspection>,
+    /// The mesh, where it is a finished scan instead of a recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scan: Option<ScanInspection>,
     /// The losses of a torn or damaged file.
     pub loss: Option<Loss>,
     /// Frames that cannot be read, with the reason.
@@ -61,6 +64,27 @@ impl TakeInspection {
         let is_damaged = |sensor: &SensorInspection| !sensor.damaged_color.is_empty();
         self.loss.is_some() || !self.unreadable.is_empty() || self.sensors.iter().any(is_damaged)
     }
+}
+
+/// The mesh of a take that is a finished scan.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct ScanInspection {
+    /// The mesh file.
+    pub file: String,
+    /// Vertices in the file.
+    pub vertices: u64,
+    /// Triangles in the file.
+    pub triangles: u64,
+    /// The unit of its lengths, as said or found from the size of a person; `None` where none fits.
+    pub unit: Option<String>,
+    /// True where somebody said the unit.
+    pub unit_said: bool,
+    /// The axis that points up, where somebody said it.
+    pub up_said: Option<String>,
+    /// True where it has colours.
+    pub has_colors: bool,
+    /// Pictures that it is coloured with.
+    pub pictures: u64,
 }
 
 /// One sensor of a take.

@@ -3,6 +3,7 @@
 mod findings;
 mod frames;
 mod problems;
+mod scan;
 mod text;
 
 use std::{fs, path::Path};
@@ -12,9 +13,10 @@ use crate::{
     import::{self, Format},
 };
 
-pub use findings::{Gap, Inspection, SensorInspection, SubjectInspection, TakeInspection};
+pub use findings::{Gap, Inspection, ScanInspection, SensorInspection, SubjectInspection, TakeInspection};
 use frames::read_frames;
 use problems::problems;
+use scan::{inspect_scan, is_scan};
 
 /// Looks through a recording, a folder of images, or all takes of a subject. Every image is decoded.
 ///
@@ -60,6 +62,9 @@ fn assumptions(rig: &Rig) -> Vec<String> {
 }
 
 fn inspect_take(path: &Path) -> Result<TakeInspection, CaptureError> {
+    if is_scan(path) {
+        return inspect_scan(path);
+    }
     let format = import::guess(path)?;
     let mut take = TakeInspection {
         name: path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use super::findings::{Inspection, TakeInspection};
+use super::findings::{Inspection, ScanInspection, TakeInspection};
 use crate::printable;
 
 impl fmt::Display for Inspection {
@@ -32,14 +32,8 @@ impl fmt::Display for Inspection {
 fn write_take(text: &mut String, take: &TakeInspection) -> fmt::Result {
     let garment = take.garment.as_ref().map_or_else(String::new, |garment| format!(" ({})", printable(garment)));
     let size = if take.bytes > 0 { format!(", {:.1} MB", take.bytes as f64 * 1e-6) } else { String::new() };
-    writeln!(
-        text,
-        "  {}{garment}: {}, {} frames, {:.1} s{size}",
-        printable(&take.name),
-        take.format,
-        take.frames,
-        take.duration_s
-    )?;
+    let content = take.scan.as_ref().map_or_else(|| format!("{} frames, {:.1} s", take.frames, take.duration_s), mesh);
+    writeln!(text, "  {}{garment}: {}, {content}{size}", printable(&take.name), take.format)?;
     for sensor in &take.sensors {
         let [width, height] = sensor.depth_size;
         let color = sensor.color_size.map_or_else(|| "no colour".to_string(), |[w, h]| format!("colour {w} x {h}"));
@@ -62,4 +56,17 @@ fn write_take(text: &mut String, take: &TakeInspection) -> fmt::Result {
         writeln!(text, "    healthy")?;
     }
     Ok(())
+}
+
+/// A finished scan in some words.
+fn mesh(scan: &ScanInspection) -> String {
+    let unit = scan.unit.as_deref().unwrap_or("of no known unit");
+    let how = if scan.unit_said || scan.unit.is_none() { "" } else { " (found by its size)" };
+    let colors = match (scan.has_colors, scan.pictures) {
+        (false, _) => "no colours".to_string(),
+        (true, 0) => "colours".to_string(),
+        (true, count) => format!("colours of {count} pictures"),
+    };
+    let up = scan.up_said.as_ref().map_or_else(String::new, |up| format!(", {} up", printable(up)));
+    format!("{}, {} triangles, {unit}{how}{up}, {colors}", printable(&scan.file), scan.triangles)
 }

@@ -14,6 +14,7 @@ pub mod depth_codec;
 mod foreign;
 mod images;
 mod index;
+pub(crate) mod log;
 mod loss;
 mod message;
 mod metadata;

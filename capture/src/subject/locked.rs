@@ -12,7 +12,8 @@ use super::{
     layer::{BODY, Layer, check_name, split_number},
     lock::SubjectLock,
     pending::{Note, PendingTake},
-    reading::Subject,
+    reading::{RECORDING, Subject},
+    scan_take::ScanTake,
 };
 use crate::{CaptureError, files::sync_parent};
 
@@ -124,11 +125,11 @@ impl LockedSubject {
         };
         let mut layer = layer.clone();
         layer.garment = garment.filter(|_| layer.number > 0).map(String::from).or(layer.garment);
-        let path = self.retake_path(&layer);
-        if path.exists() {
+        if let Some(path) = self.whole_retake(&layer) {
             // Recorded, but never accepted (the program ended between): nothing that was captured is lost.
             self.reject(&path, &layer)?;
         }
+        let path = self.retake_path(&layer);
         Ok(PendingTake { layer, path, rig: String::new(), source: String::new(), retake: true })
     }
 
@@ -146,7 +147,7 @@ impl LockedSubject {
     /// # Errors
     /// [`CaptureError`] where the recording is missing or the files cannot be moved.
     pub fn accept(&mut self, take: PendingTake) -> Result<Option<PathBuf>, CaptureError> {
-        if !take.path.is_file() {
+        if !take.path.is_file() && !ScanTake::is_at(&take.path) {
             return Err(CaptureError::format(&take.path, "the take was not recorded"));
         }
         self.enter(take.layer, take.rig, take.retake)
@@ -206,11 +207,11 @@ impl LockedSubject {
     /// Completes the take that `pending.toml` names, where its recording is whole.
     fn complete_pending(&mut self) -> Result<(), CaptureError> {
         let Some(note) = Note::read(self.folder()) else { return Ok(()) };
-        if note.retake && note.number < self.layers().len() && self.retake_path(&note.layer).is_file() {
+        if note.retake && note.number < self.layers().len() && self.whole_retake(&note.layer).is_some() {
             self.enter(note.layer.clone(), note.rig.clone(), true)?;
         }
         let is_entered = self.layers().get(note.number).is_some_and(|layer| layer.name == note.layer.name);
-        if is_entered && self.take_path(&note.layer).is_file() {
+        if is_entered && self.take_path(&note.layer).exists() {
             self.completed = Some(note);
         }
         Ok(())
@@ -218,7 +219,7 @@ impl LockedSubject {
 
     fn complete_retakes(&self) -> Result<(), CaptureError> {
         for layer in self.layers() {
-            if !self.take_path(layer).exists() && self.retake_path(layer).is_file() {
+            if !self.take_path(layer).exists() && self.whole_retake(layer).is_some() {
                 self.replace_take(layer)?;
             }
         }
@@ -246,22 +247,31 @@ impl LockedSubject {
 
     /// Moves the old take away and the new one to its place.
     fn replace_take(&self, layer: &Layer) -> Result<Option<PathBuf>, CaptureError> {
-        let (old, new) = (self.take_path(layer), self.retake_path(layer));
+        let old = self.take_path(layer);
+        let new = self.whole_retake(layer).unwrap_or_else(|| self.retake_path(layer));
         let kept = if old.exists() { Some(self.reject(&old, layer)?) } else { None };
-        fs::rename(&new, &old).map_err(|error| CaptureError::io(&new, error))?;
-        sync_parent(&old)?;
+        let name = format!("{}.{}", layer.label(), extension(&new));
+        let path = self.takes_folder().join(name);
+        fs::rename(&new, &path).map_err(|error| CaptureError::io(&new, error))?;
+        sync_parent(&path)?;
         Ok(kept)
     }
 
     fn reject(&self, old: &Path, layer: &Layer) -> Result<PathBuf, CaptureError> {
         let folder = self.takes_folder().join("rejected");
         fs::create_dir_all(&folder).map_err(|error| CaptureError::io(&folder, error))?;
-        let free = (1_u32..).map(|n| folder.join(format!("{}.{n}.mcap", layer.label()))).find(|path| !path.exists());
+        let name = |n: u32| format!("{}.{n}.{}", layer.label(), extension(old));
+        let free = (1_u32..).map(|n| folder.join(name(n))).find(|path| !path.exists());
         let free = free.ok_or_else(|| CaptureError::format(&folder, "there is no free name left"))?;
         fs::rename(old, &free).map_err(|error| CaptureError::io(old, error))?;
         sync_parent(&free)?;
         Ok(free)
     }
+}
+
+/// The extension of a take's path.
+fn extension(path: &Path) -> &str {
+    path.extension().and_then(|extension| extension.to_str()).unwrap_or(RECORDING)
 }
 
 /// Locks a subject's folder, which is created where it is missing; true where there is a subject in it.

@@ -5,6 +5,7 @@
 //!   subject.toml                 name, date, rig, the layers in order with their types, notes
 //!   pending.toml                 which take is being recorded; only while that lasts
 //!   takes/00-body.mcap           one recording a take; never changed after it is closed
+//!   takes/00-body.scan/          or a finished scan of another program, as it was given
 //!   takes/rejected/              takes that were replaced
 //!   edits/01-trousers.json       corrections by hand
 //!   build/                       everything in here can be deleted and built again
@@ -21,12 +22,14 @@ mod lock;
 mod locked;
 mod pending;
 mod reading;
+mod scan_take;
 
 pub use layer::{BODY, Layer};
 pub use lock::SubjectLock;
 pub use locked::LockedSubject;
 pub use pending::PendingTake;
 pub use reading::Subject;
+pub use scan_take::ScanTake;
 
 /// Reads the text of `subject.toml` and of `pending.toml`; for `fuzz/`.
 pub(crate) fn parse(text: &str) {

@@ -7,7 +7,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{about::parse_toml, layer::Layer};
+use super::{about::parse_toml, layer::Layer, scan_take::EXTENSION};
 use crate::{
     CaptureError,
     files::{atomic_write, read_text},
@@ -25,6 +25,14 @@ pub struct PendingTake {
     /// Where the frames come from (an imported folder); empty for cameras.
     pub source: String,
     pub(super) retake: bool,
+}
+
+impl PendingTake {
+    /// The same, for a finished scan instead of a recording: its path is a folder.
+    pub fn of_scan(mut self) -> Self {
+        self.path.set_extension(EXTENSION);
+        self
+    }
 }
 
 /// The content of `pending.toml`: enough to enter the take into `subject.toml` when the program was killed before it could.

@@ -9,12 +9,16 @@ use super::{
     about::{self, About},
     layer::{Layer, check_name},
     pending::Note,
+    scan_take::EXTENSION as SCAN,
 };
 use crate::{
     CaptureError,
     files::{is_there, open_regular},
     printable_path,
 };
+
+/// The extension of recordings.
+pub(super) const RECORDING: &str = "mcap";
 
 /// A subject's folder. Reading it changes nothing on disk; [`LockedSubject`](super::LockedSubject) can write.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,9 +79,9 @@ impl Subject {
         self.about.layers.iter().find(|layer| layer.name == name || layer.label() == name)
     }
 
-    /// `takes/NN-name.mcap`.
+    /// The take of a layer: `takes/NN-name.mcap`, or where that is a finished scan, the folder `takes/NN-name.scan`.
     pub fn take_path(&self, layer: &Layer) -> PathBuf {
-        self.takes_folder().join(format!("{}.mcap", layer.label()))
+        self.kept(&layer.label()).unwrap_or_else(|| self.takes_folder().join(format!("{}.{RECORDING}", layer.label())))
     }
 
     /// `edits/NN-name.json`.
@@ -134,7 +138,18 @@ impl Subject {
 
     /// Where a new take of an existing layer is recorded to.
     pub(super) fn retake_path(&self, layer: &Layer) -> PathBuf {
-        self.takes_folder().join(format!("{}.retake.mcap", layer.label()))
+        self.takes_folder().join(format!("{}.retake.{RECORDING}", layer.label()))
+    }
+
+    /// A new take of an existing layer that was recorded whole and not yet accepted.
+    pub(super) fn whole_retake(&self, layer: &Layer) -> Option<PathBuf> {
+        self.kept(&format!("{}.retake", layer.label()))
+    }
+
+    /// The recording or scan of that name in `takes/`.
+    fn kept(&self, stem: &str) -> Option<PathBuf> {
+        let at = |extension: &str| self.takes_folder().join(format!("{stem}.{extension}"));
+        Some(at(RECORDING)).filter(|path| is_there(path)).or_else(|| Some(at(SCAN)).filter(|path| path.is_dir()))
     }
 
     /// Enters recordings that no layer has yet: the one that `pending.toml` names with its type, others by name.
@@ -150,10 +165,14 @@ impl Subject {
         }
     }
 
-    /// The layer name of the recording `takes/NN-name.mcap` of that number; the first by name where there are several.
+    /// The layer name of the take `takes/NN-name.mcap` (or `.scan`) of that number; the first by name where there are several.
     fn recorded_name(&self, number: usize) -> Option<String> {
         let prefix = format!("{number:02}-");
-        let name_of = |file: String| Some(file.strip_suffix(".mcap")?.strip_prefix(&prefix)?.to_string());
+        let name_of = |file: String| {
+            let (stem, extension) = file.rsplit_once('.')?;
+            let name = stem.strip_prefix(&prefix).filter(|_| [RECORDING, SCAN].contains(&extension))?;
+            Some(name.to_string())
+        };
         let files = fs::read_dir(self.takes_folder()).ok()?.flatten();
         let names = files.filter_map(|file| file.file_name().into_string().ok()).filter_map(name_of);
         let free = |name: &String| check_name(name).is_ok() && self.layer(name).is_none();

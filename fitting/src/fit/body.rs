@@ -140,7 +140,7 @@ fn turned(landmarks: HandLandmarks, rotation: &UnitQuaternion<f64>) -> HandLandm
 }
 
 /// Takes the best starts to the resolution at which front and back differ, and keeps the one that agrees best.
-fn best_start(
+pub(super) fn best_start(
     model: &BodyModel,
     (scan, trust): (&Mesh, &[f32]),
     guides: &Guides,

@@ -13,6 +13,7 @@ mod report;
 mod resolution;
 mod seed;
 mod starts;
+mod upright;
 mod verdict;
 
 pub(crate) use fingers::fit_hands_again;
@@ -20,4 +21,5 @@ pub use {
     body::{BodyFit, fit_body},
     prepare::Mend,
     report::{DistanceStats, FitReport, Verdict},
+    upright::find_upright,
 };

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector3};
 
 use super::{
+    TextureCorners,
     header::{Element, Property, Scalar},
     numbers::Numbers,
 };
@@ -76,27 +77,43 @@ fn list_length(scalar: Scalar, numbers: &mut dyn Numbers) -> Result<usize, Strin
     Ok(length as usize)
 }
 
-/// Reads triangles into `mesh`.
-pub(super) fn read_faces(element: &Element, numbers: &mut dyn Numbers, mesh: &mut Mesh) -> Result<(), String> {
-    let mut corners: Vec<u32> = Vec::new();
+/// Reads triangles into `mesh`, and the texture coordinates of their corners into `texture`.
+pub(super) fn read_faces(
+    element: &Element,
+    numbers: &mut dyn Numbers,
+    mesh: &mut Mesh,
+    texture: &mut Vec<TextureCorners>,
+) -> Result<(), String> {
+    let (mut corners, mut places): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
     for face in 0..element.count {
+        corners.clear();
+        places.clear();
         for property in &element.properties {
-            let is_face = property.name == "vertex_indices" || property.name == "vertex_index";
-            let (true, Some(count)) = (is_face, property.list_count) else {
-                read_value(property, numbers)?;
-                continue;
-            };
-            corners.clear();
-            for _ in 0..list_length(count, numbers)? {
-                let index = numbers.next(property.scalar)?;
-                if !(0.0..=f64::from(u32::MAX)).contains(&index) || index.fract() != 0.0 {
-                    return Err(format!("face {face} has the vertex index {index}"));
+            match property.name.as_str() {
+                "vertex_indices" | "vertex_index" if property.list_count.is_some() => {
+                    read_list(property, numbers, &mut corners)?;
                 }
-                corners.push(index as u32);
+                "texcoord" if property.list_count.is_some() => read_list(property, numbers, &mut places)?,
+                _ => drop(read_value(property, numbers)?),
             }
-            let fan = 1..corners.len().max(2) - 1;
-            mesh.triangles.extend(fan.map(|i| [corners[0], corners[i], corners[i + 1]]));
         }
+        if let Some(index) = corners.iter().find(|i| !(0.0..=f64::from(u32::MAX)).contains(*i) || i.fract() != 0.0) {
+            return Err(format!("face {face} has the vertex index {index}"));
+        }
+        let fan = 1..corners.len().max(2) - 1;
+        mesh.triangles.extend(fan.clone().map(|i| [0, i, i + 1].map(|c| corners[c] as u32)));
+        if places.len() == 2 * corners.len() {
+            texture.extend(fan.map(|i| [0, i, i + 1].map(|c| [places[2 * c] as f32, places[2 * c + 1] as f32])));
+        }
+    }
+    Ok(())
+}
+
+/// The numbers of a list property.
+fn read_list(property: &Property, numbers: &mut dyn Numbers, list: &mut Vec<f64>) -> Result<(), String> {
+    let Some(count) = property.list_count else { return Ok(()) };
+    for _ in 0..list_length(count, numbers)? {
+        list.push(numbers.next(property.scalar)?);
     }
     Ok(())
 }

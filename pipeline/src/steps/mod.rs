@@ -6,4 +6,5 @@ pub mod fit;
 pub mod fuse;
 pub mod page;
 pub mod pose;
+pub mod read_scan;
 pub mod stack;

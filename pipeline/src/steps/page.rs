@@ -7,6 +7,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 use serde_json::{Value, json};
 use toile_character::{Motion, Pose, SkinWeights, dress_pose::t_pose, skinning};
 use toile_fitting::{BodyMeasure, MeasureTable};
+use toile_fusion::FusionReport;
 use toile_garments::{LayerReport, PosedReport};
 use toile_geometry::Mesh;
 
@@ -44,7 +45,7 @@ pub struct Page<'a> {
 impl Step for Page<'_> {
     type Report = ();
     const NAME: &'static str = "report";
-    const VERSION: u32 = 6;
+    const VERSION: u32 = 7;
     const SECONDS: f64 = 4.0;
     const OUTPUTS_VARY: bool = true;
 
@@ -230,13 +231,17 @@ fn of_takes(takes: &[TakeSummary]) -> Figures {
     figures
 }
 
-const TAKES: [Row<TakeSummary>; 10] = [
-    ("frames fused", |t| t.fuse.frames_fused.to_string()),
-    ("left out", |t| t.fuse.dropped.len().to_string()),
-    ("turned, °", |t| format!("{:.0}", t.fuse.turned_deg)),
-    ("residual, mm", |t| format!("{:.2}", t.fuse.residual_mm)),
-    ("seam, mm", |t| format!("{:.2}", t.fuse.seam_after_mm)),
-    ("unseen, %", |t| format!("{:.1}", t.fuse.filled_percent)),
+const TAKES: [Row<TakeSummary>; 11] = [
+    ("finished scan", |t| t.read.as_ref().map_or("–".into(), |read| read.file.clone())),
+    ("frames fused", |t| fused(t, |fuse| fuse.frames_fused.to_string())),
+    ("left out", |t| fused(t, |fuse| fuse.dropped.len().to_string())),
+    ("turned, °", |t| fused(t, |fuse| format!("{:.0}", fuse.turned_deg))),
+    ("residual, mm", |t| fused(t, |fuse| format!("{:.2}", fuse.residual_mm))),
+    ("seam, mm", |t| fused(t, |fuse| format!("{:.2}", fuse.seam_after_mm))),
+    ("unseen, %", |t| {
+        let read = t.read.as_ref().map(|read| read.cleaned.filled_percent);
+        read.map_or_else(|| fused(t, |fuse| format!("{:.1}", fuse.filled_percent)), |percent| format!("{percent:.1}"))
+    }),
     ("garment", |t| {
         let guessed = |cut: &toile_garments::ExtractionReport| if cut.type_guessed { " (guessed)" } else { "" };
         t.cut.as_ref().map_or("–".into(), |cut| format!("{}{}", cut.garment_type, guessed(cut)))
@@ -245,6 +250,11 @@ const TAKES: [Row<TakeSummary>; 10] = [
     ("filled, %", |t| t.cut.as_ref().map_or("–".into(), |cut| format!("{:.1}", 100.0 * cut.filled_share))),
     ("unsure, %", |t| t.cut.as_ref().map_or("–".into(), |cut| format!("{:.1}", 100.0 * cut.unsure_share))),
 ];
+
+/// A figure of fusion; a finished scan has none.
+fn fused(take: &TakeSummary, of: fn(&FusionReport) -> String) -> String {
+    take.fuse.as_ref().map_or("–".into(), of)
+}
 
 fn gap_shares(layer: &LayerReport) -> Vec<f64> {
     layer.gaps.iter().map(|share| f64::from(*share)).collect()

@@ -4,21 +4,27 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 use toile_capture::{
-    LockedSubject, PendingTake, Recorder, RecorderOptions, Replay, Sensor,
+    CaptureError, LockedSubject, PendingTake, Recorder, RecorderOptions, Replay, ScanTake, Sensor,
     files::part_path,
     import::{self, Format, ImportReport},
     printable_path,
 };
 use toile_character::GarmentType;
-use toile_pipeline::{Observer, Opened};
+use toile_pipeline::{Observer, Opened, ScanSurvey};
+use toile_scans::{Unit, Up, kind_of, unreadable};
 
 use crate::{StudioError, commands::reach::must_exist, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
-Formats: toile-folder (depth/, color/, camera.json, timestamps.txt), tum, uva, seven-scenes, mcap; guessed when not said.
+Formats, guessed when not said: toile-folder (depth/, color/, camera.json, timestamps.txt; also Open3D's), tum, uva,
+seven-scenes (also 3DMatch), redwood, associated (ICL-NUIM), stray-scanner, freenect (fakenect dumps), record3d (.r3d),
+sens (BundleFusion, ScanNet), bag (ROS 1, librealsense), ros-mcap (ROS 1 and 2), mcap.
+
+Finished scans become takes, too: PLY, OBJ, GLB, glTF and STL, with pictures or vertex colours, in any unit, any axis up.
 
 Examples:
+  toile import scans/body.obj --subject anna --layer body
   toile import takes/body     --subject anna --layer body
   toile import takes/trousers --subject anna --layer trousers --type trousers
   toile import takes/again    --subject anna --layer trousers --retake";
@@ -44,6 +50,12 @@ pub struct Import {
     /// Replace the layer's take; the old one is kept under takes/rejected/
     #[arg(long)]
     retake: bool,
+    /// The unit of a finished scan: m, cm, mm, in, ft (found by its size when not said)
+    #[arg(long, value_name = "UNIT")]
+    unit: Option<Unit>,
+    /// The axis of a finished scan that points up: x, y, z, -x, -y, -z (found when not said)
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    up: Option<Up>,
 }
 
 impl Import {
@@ -53,6 +65,17 @@ impl Import {
     /// [`StudioError`] where the folder cannot be read or the take cannot be written; the subject is then as it was.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         must_exist(&self.folder)?;
+        if let Some(reason) = unreadable(&self.folder).filter(|_| self.folder.is_file()) {
+            return Err(CaptureError::format(&self.folder, reason).into());
+        }
+        if self.folder.is_file() && kind_of(&self.folder).is_some() {
+            return self.import_scan(session);
+        }
+        if self.unit.is_some() || self.up.is_some() {
+            let reason =
+                "--unit and --up are of finished scans (PLY, OBJ, GLB, glTF, STL); a recording says its own unit";
+            return Err(StudioError::Usage(reason.into()));
+        }
         let mut opened = Opened::new(&self.folder, self.format)?;
         let mut subject = LockedSubject::open_or_create(&self.subject)?;
         if let Some(answer) = self.completed(&subject) {
@@ -83,12 +106,7 @@ impl Import {
         subject: &mut LockedSubject,
         session: &Session,
     ) -> Result<(ImportReport, PathBuf, Option<PathBuf>), StudioError> {
-        let mut pending: PendingTake = if self.retake {
-            subject.retake(&self.layer, self.garment.map(GarmentType::name))?
-        } else {
-            let garment = self.garment.or_else(|| GarmentType::from_layer_name(&self.layer));
-            subject.next_take(&self.layer, garment.map(GarmentType::name))?
-        };
+        let mut pending = self.pending(subject)?;
         pending.rig = opened.source.rig().sensors.first().map_or_else(String::new, |s| s.identity.model.clone());
         pending.source = source_name(&self.folder);
         subject.announce(&pending)?;
@@ -100,6 +118,50 @@ impl Import {
         session.progress.end();
         subject.remarks().iter().for_each(|remark| session.progress.remark(remark));
         Ok((report, take, kept))
+    }
+
+    /// The take that will be imported.
+    fn pending(&self, subject: &LockedSubject) -> Result<PendingTake, StudioError> {
+        if self.retake {
+            return Ok(subject.retake(&self.layer, self.garment.map(GarmentType::name))?);
+        }
+        let garment = self.garment.or_else(|| GarmentType::from_layer_name(&self.layer));
+        Ok(subject.next_take(&self.layer, garment.map(GarmentType::name))?)
+    }
+
+    /// Imports a finished scan: its files are copied as they are, after one look at what they hold.
+    fn import_scan(&self, session: &Session) -> Result<Answer, StudioError> {
+        session.progress.plan(1.0);
+        session.progress.begin("look at the scan", 1.0);
+        let survey = ScanSurvey::new(&self.folder, self.unit, self.up)?;
+        session.progress.end();
+        let mut subject = LockedSubject::open_or_create(&self.subject)?;
+        let done = subject.completed(&self.layer, &source_name(&self.folder)).filter(|_| !self.retake);
+        if let Some(layer) = done {
+            // An earlier run of this very command was killed after the take was whole.
+            return Ok(scan_answer(&survey, &subject.take_path(layer), None));
+        }
+        match self.copy_scan(&mut subject) {
+            Ok((take, kept)) => {
+                survey.sentences.iter().chain(&subject.remarks()).for_each(|remark| session.progress.remark(remark));
+                Ok(scan_answer(&survey, &take, kept.as_deref()))
+            }
+            Err(error) => {
+                subject.give_up();
+                Err(error)
+            }
+        }
+    }
+
+    fn copy_scan(&self, subject: &mut LockedSubject) -> Result<(PathBuf, Option<PathBuf>), StudioError> {
+        let mut pending = self.pending(subject)?.of_scan();
+        pending.rig = "finished scan".into();
+        pending.source = source_name(&self.folder);
+        subject.announce(&pending)?;
+        ScanTake::create(&pending.path, &self.folder, self.unit, self.up)?;
+        let layer = pending.layer.clone();
+        let kept = subject.accept(pending)?;
+        Ok((subject.take_path(&layer), kept))
     }
 
     fn answer(&self, torn: Vec<String>, report: &ImportReport, take: &Path, kept: Option<&Path>) -> Answer {
@@ -116,6 +178,22 @@ impl Import {
         }
         Answer { text, results: json!({ "take": take, "report": report, "kept": kept }), lost, ..Answer::default() }
     }
+}
+
+/// The answer where a finished scan became a take.
+fn scan_answer(survey: &ScanSurvey, take: &Path, kept: Option<&Path>) -> Answer {
+    let (take, kept) = (printable_path(take), kept.map(printable_path));
+    let triangles = survey.surface.triangles.len();
+    let mut text = format!("{take}: {triangles} triangles, in {}, {} up\n", survey.unit.plural(), survey.up);
+    if let Some(kept) = &kept {
+        text.push_str(&format!("the old take is kept as {kept}\n"));
+    }
+    let results = json!({
+        "take": take,
+        "scan": { "triangles": triangles, "unit": survey.unit, "up": survey.up, "has_colors": survey.surface.has_colors() },
+        "kept": kept,
+    });
+    Answer { text, results, ..Answer::default() }
 }
 
 /// Numbers of the frames that are missing between those of a take; of many, the first few.

@@ -18,7 +18,8 @@ const SIMULATED: &[&str] = &["driver-simulated", "synthetic"];
 
 const TABLE: &[Row] = &[
     row("geometry", &[], &[]),
-    row("capture", &["geometry"], &["outside"]),
+    row("scans", &["geometry"], &[]),
+    row("capture", &["geometry", "scans"], &["outside"]),
     row("fusion", &["geometry", "capture"], &[]),
     row("stereo", &["geometry", "capture"], &["outside"]),
     row("character", &["geometry"], &["outside"]),
@@ -58,7 +59,7 @@ const TABLE: &[Row] = &[
     ),
     row(
         "pipeline",
-        &["geometry", "capture", "fusion", "character", "fitting", "garments", "animation", "avatar", "render"],
+        &["geometry", "scans", "capture", "fusion", "character", "fitting", "garments", "animation", "avatar", "render"],
         &["synthetic", "driver-synthetic"],
     ),
     // The program and the end-to-end tests bring everything together.
@@ -88,6 +89,7 @@ const ONLY: &[(&str, &[&str])] = &[
 const NEVER: &[(&str, &[&str], &str)] = &[
     ("geometry", &["Skeleton", "Garment", "std::net", "/dev/"], "knows no body, no garment, no device"),
     ("capture", &["kinect", "Kinect", "realsense::", "RealSense"], "knows no vendor"),
+    ("scans", &["Skeleton", "BodyModel", "toile_fitting"], "does not know what a body is"),
     ("fusion", &["Skeleton", "BodyModel", "stature"], "does not know what a body is"),
     ("stereo", &["/dev/video", "v4l"], "opens no camera"),
     ("character", &["gltf", "HIERARCHY"], "reads no formats of other people"),
