@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     SyntheticError,
     motion::Motion,
-    rig::{MAX_SENSORS, RigSettings},
+    rig_settings::{MAX_SENSORS, RigSettings},
     sensor::SensorPreset,
 };
 

@@ -66,13 +66,13 @@ impl Preparer {
     }
 }
 
-/// The sensor of a rig that is fused.
+/// A sensor of a rig that can be fused.
 ///
 /// # Errors
 /// [`FusionError::Calibration`] where there is none, or its calibration cannot be used.
-pub(crate) fn first_sensor(rig: &Rig) -> Result<&Sensor, FusionError> {
-    let wrong = |reason: &str| FusionError::Calibration { sensor: 0, reason: reason.into() };
-    let sensor = rig.sensors.first().ok_or_else(|| wrong("the source names no sensor"))?;
+pub(crate) fn usable_sensor(rig: &Rig, index: usize) -> Result<&Sensor, FusionError> {
+    let wrong = |reason: &str| FusionError::Calibration { sensor: index, reason: reason.into() };
+    let sensor = rig.sensors.get(index).ok_or_else(|| wrong("the source names no sensor"))?;
     if !sensor.depth.is_valid() || sensor.depth_scale.is_nan() || sensor.depth_scale <= 0.0 {
         return Err(wrong("image size, focal length or depth scale is not positive"));
     }
