@@ -56,6 +56,8 @@ pub struct SensorReport {
     pub noise_mm: f64,
     /// By how much its clock runs faster than the host's, parts in a million.
     pub clock_drift_ppm: f64,
+    /// Its device times jump: its frames are placed by when they arrived.
+    pub clock_is_unsteady: bool,
     /// Where it was found to stand in the rig's frame, metres, as a rig file has it. The leading sensor stays.
     pub position_m: [f64; 3],
     /// How it is turned there: axis times angle, degrees.

@@ -21,6 +21,9 @@ mod path;
 mod place;
 mod sighting;
 
+#[cfg(test)]
+mod tests;
+
 pub(crate) use found::{RigFound, rig_warnings, settle};
 pub(crate) use join::join;
 pub(crate) use member::Member;

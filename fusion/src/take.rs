@@ -10,6 +10,7 @@ mod waiting;
 
 pub(crate) use preparer::Preparer;
 pub(crate) use survey::survey_sensor;
+pub(crate) use waiting::{Waiting, spread};
 
 pub use fuse::fuse;
 pub use fuser::{Fuser, Outcome};

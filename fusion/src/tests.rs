@@ -148,7 +148,7 @@ fn joint_optimisation_recovers_disturbed_poses() {
         .collect();
     poses[0] = truth[0];
     let before: f64 = truth.iter().zip(&poses).map(|(t, p)| difference(t, p).0).sum::<f64>() / 24.0;
-    let closing = close(&views, &mut poses, 8);
+    let closing = close(&views, &vec![0; views.len()], &mut poses, 8);
     let after: f64 = truth.iter().zip(&poses).map(|(t, p)| difference(t, p).0).sum::<f64>() / 24.0;
     assert!(before > 0.006 && after < 0.0008, "{before} -> {after}, {closing:?}");
     assert!(closing.seam_pairs > 0 && closing.seam_after < closing.seam_before);

@@ -25,6 +25,7 @@ pub(crate) struct FoundSensor {
     pub frames_seen: usize,
     pub noise: f64,
     pub drift_ppm: f64,
+    /// Its device times cannot be used.
     pub by_arrival: bool,
     /// The place by all frames together, room frame.
     pub room_from_camera: Rigid,
@@ -80,6 +81,7 @@ fn fill(report: &mut SensorReport, found: &FoundSensor, places: &[Rigid]) {
     report.noise_mm = found.noise * 1e3;
     report.clock_drift_ppm = found.drift_ppm;
     report.spread_mm = toile_geometry::statistics::median(&mut off).unwrap_or(0.0) * 1e3;
+    report.clock_is_unsteady = found.by_arrival;
     report.moved = found.push.map(|(push, at_s)| MovedReport {
         after_s: at_s,
         shift_mm: push.moved.0 * 1e3,
@@ -99,7 +101,9 @@ pub(crate) fn rig_warnings(reports: &[SensorReport], leader: &str) -> Vec<String
     let placed = || reports.iter().filter(|r| r.is_placed);
     for r in placed() {
         let name = &r.name;
-        if r.clock_drift_ppm.abs() > QUARTZ_PPM {
+        if r.clock_is_unsteady {
+            list.push(format!("the clock of `{name}` jumps; its frames are placed by when they arrived"));
+        } else if r.clock_drift_ppm.abs() > QUARTZ_PPM {
             let ppm = r.clock_drift_ppm;
             list.push(format!(
                 "the clock of `{name}` runs {ppm:.0} millionths off the host's; its frames are placed by the host's"

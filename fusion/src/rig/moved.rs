@@ -9,8 +9,9 @@ use super::place::{Subject, apart};
 const LEAST: usize = 6;
 /// A push that matters, metres at the subject: stands on a firm floor keep still to less.
 const JUMP: f64 = 0.004;
-/// And it is this many standard errors large.
-const SIGNIFICANT: f64 = 8.0;
+/// And it is this many times what the means of as many frames before and after any moment usually differ by: people sway,
+/// and the places that their frames give with them, but slowly.
+const SIGNIFICANT: f64 = 5.0;
 /// Turns are weighed by this lever, metres.
 const LEVER: f64 = 0.5;
 
@@ -27,16 +28,13 @@ pub(crate) struct Push {
 pub(crate) fn find_push(places: &[Rigid], subject: &Subject) -> Option<Push> {
     let reference = subject.mean(places)?;
     let series: Vec<Vector6<f64>> = places.iter().map(|p| weighed(subject.step(&reference, p))).collect();
-    let step = |w: &[Vector6<f64>]| (w[1] - w[0]).norm();
-    let mut steps: Vec<f64> = series.windows(2).map(step).collect();
-    // Of two equal spreads a difference has the root of two.
-    let noise = toile_geometry::statistics::median(&mut steps)? / 2f64.sqrt();
     let mean = |part: &[Vector6<f64>]| part.iter().sum::<Vector6<f64>>() / part.len() as f64;
-    let splits = LEAST..places.len().saturating_sub(LEAST) + 1;
-    let jump = |at: usize| (mean(&series[at..]) - mean(&series[..at])).norm();
-    let size = |at: usize| ((at * (series.len() - at)) as f64 / series.len() as f64).sqrt();
-    let at = splits.max_by(|a, b| (jump(*a) * size(*a)).total_cmp(&(jump(*b) * size(*b))))?;
-    if jump(at) < JUMP || jump(at) * size(at) < SIGNIFICANT * noise {
+    let splits = || LEAST..places.len().saturating_sub(LEAST) + 1;
+    let near = |at: usize| (mean(&series[at..at + LEAST]) - mean(&series[at - LEAST..at])).norm();
+    let usual = toile_geometry::statistics::median(&mut splits().map(near).collect::<Vec<f64>>())?;
+    let at = splits().max_by(|a, b| near(*a).total_cmp(&near(*b)))?;
+    let lasting = (mean(&series[at..]) - mean(&series[..at])).norm();
+    if near(at).min(2.0 * lasting) < JUMP || near(at) < SIGNIFICANT * usual {
         return None;
     }
     let moved = apart(&subject.mean(&places[..at])?, &subject.mean(&places[at..])?);

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use toile_capture::{Frame, Rig, Source};
+use toile_capture::{Rig, Source};
 
 use super::{
     fuser::{Fuser, Outcome},
+    preparer::usable_sensor,
     survey::survey_sensor,
-    waiting::Waiting,
+    waiting::{Waiting, spread},
 };
 use crate::{
     FusionError, FusionSettings, Scan, Volume,
@@ -15,7 +16,6 @@ use crate::{
     finish::finish,
     report::DroppedFrame,
     rig::{Member, join},
-    subject::SURVEY_FRAMES,
     timings::Stopwatch,
     tracking::MAX_VIEWS,
 };
@@ -58,29 +58,18 @@ fn join_others(
     others: Vec<(usize, Vec<Waiting>)>,
     arrivals: &[(i64, i64)],
 ) -> Result<(), FusionError> {
+    // Known poses are those of the leading sensor.
+    let joins = fuser.settings.poses.is_none() && !fuser.kept.is_empty();
     let mut members = Vec::new();
     for (sensor, frames) in others {
-        let unused = |fuser: &mut Fuser| {
+        if joins && usable_sensor(rig, sensor).is_ok() {
+            members.push(Member::new(rig, sensor, frames, &fuser.settings));
+        } else {
             let name = rig.sensors.get(sensor).map_or_else(|| format!("number {sensor}"), |s| s.name.clone());
             fuser.log.sensors_not_used.push(name);
-        };
-        // Known poses are those of the leading sensor.
-        if fuser.settings.poses.is_some() || fuser.kept.is_empty() {
-            unused(fuser);
-            continue;
-        }
-        let few = spread(&frames);
-        let unpacked = frames.iter().map(Waiting::unpacked);
-        let (settings, clock) = (&fuser.settings, &mut fuser.clock);
-        match Member::new(rig, sensor, unpacked, &few, settings, clock) {
-            Ok(member) => members.push(member),
-            Err(error) => {
-                tracing::debug!(sensor, %error, "sensor not used");
-                unused(fuser);
-            }
         }
     }
-    if members.is_empty() { Ok(()) } else { join(fuser, members, arrivals) }
+    if members.is_empty() { Ok(()) } else { join(fuser, rig, members, arrivals) }
 }
 
 /// Pushes every frame; a few views are tried again where they could not be placed at once.
@@ -99,13 +88,6 @@ fn push_all(fuser: &mut Fuser, frames: Vec<Waiting>, progress: &(dyn Fn(f32) + S
         progress(0.1 + 0.4 * (i + 1) as f32 / count);
     }
     if dropped.is_empty() { Ok(()) } else { fuser.retry(dropped) }
-}
-
-/// Frames with depth spread over the take.
-fn spread(frames: &[Waiting]) -> Vec<Frame> {
-    let with_depth: Vec<&Waiting> = frames.iter().filter(|f| f.has_depth()).collect();
-    let step = with_depth.len().div_ceil(SURVEY_FRAMES).max(1);
-    with_depth.into_iter().step_by(step).map(Waiting::unpacked).collect()
 }
 
 /// The content of a source.

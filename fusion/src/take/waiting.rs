@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use toile_capture::{DepthImage, Frame, depth_codec};
 
+use crate::subject::SURVEY_FRAMES;
+
 /// A frame that waits for the volume to be found.
 pub(crate) struct Waiting {
     pub frame: Frame,
@@ -36,4 +38,11 @@ impl Waiting {
         }
         frame
     }
+}
+
+/// Frames with depth spread over the take.
+pub(crate) fn spread(frames: &[Waiting]) -> Vec<Frame> {
+    let with_depth: Vec<&Waiting> = frames.iter().filter(|f| f.has_depth()).collect();
+    let step = with_depth.len().div_ceil(SURVEY_FRAMES).max(1);
+    with_depth.into_iter().step_by(step).map(Waiting::unpacked).collect()
 }
