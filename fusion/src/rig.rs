@@ -19,11 +19,13 @@ mod member;
 mod moved;
 mod path;
 mod place;
+mod settled;
 mod sighting;
 
 #[cfg(test)]
 mod tests;
 
-pub(crate) use found::{RigFound, rig_warnings, settle};
+pub(crate) use found::RigFound;
 pub(crate) use join::join;
 pub(crate) use member::Member;
+pub(crate) use settled::{rig_warnings, settle};

@@ -61,7 +61,7 @@ pub(crate) fn join(
         let mut left = Vec::new();
         for mut member in std::mem::take(&mut waiting) {
             match locate(fuser, rig, &mut member, &path) {
-                Some(place) => fuse_at(fuser, member, &path, &place)?,
+                Some(place) => fuse_at(fuser, &member, &path, &place)?,
                 None => left.push(member),
             }
         }
@@ -122,9 +122,9 @@ fn refined(fuser: &Fuser, looks: &[Look], (place, near): &Agreed) -> Rigid {
 }
 
 /// Registers and fuses the frames of a sensor that stands at about `place`.
-fn fuse_at(fuser: &mut Fuser, member: Member, path: &Path, place: &Rigid) -> Result<(), FusionError> {
-    let registered = register_all(fuser, &member, path, place);
-    let found = describe(fuser, &member, path, &registered, place);
+fn fuse_at(fuser: &mut Fuser, member: &Member, path: &Path, place: &Rigid) -> Result<(), FusionError> {
+    let registered = register_all(fuser, member, path, place);
+    let found = describe(fuser, member, path, &registered, place);
     fuser.rig.sensors.push(found);
     fuser.log.seen += member.len();
     fuser.model.noise = fuser.model.noise.max(member.noise);
