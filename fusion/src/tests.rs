@@ -214,9 +214,14 @@ fn a_surface_needs_more_weight_in_a_longer_take_of_a_subject_that_turns() {
 }
 
 #[test]
-fn a_rig_whose_other_sensors_are_not_fused_is_a_warning() {
+fn sensors_that_known_poses_do_not_place_are_a_warning() {
     let scene = Scene { with_floor: false, with_wall: false, ..Scene::new() };
-    let whole = FusionSettings { volume: Volume::All, closing_rounds: 0, refine_rounds: 0, ..settings() };
+    let pose = |f: &toile_capture::Frame| KnownPose {
+        device_time_ns: f.device_time_ns,
+        scan_from_camera: scene.figure_from_camera((6.0 * f.index as f64).to_radians()),
+    };
+    let poses = scene.frames(&steps(4, 6.0)).iter().map(pose).collect();
+    let whole = FusionSettings { volume: Volume::All, poses: Some(poses), ..settings() };
     let mut source = scene.source(&steps(4, 6.0));
     let fused = |source: &mut Memory| fuse(source, &whole, &|_| {}).unwrap().report;
     assert_eq!(fused(&mut source).sensors_not_used, [""; 0]);

@@ -73,7 +73,7 @@ fn warnings(report: &FusionReport) -> Vec<String> {
     let mut list = Vec::new();
     if !report.sensors_not_used.is_empty() {
         let names = report.sensors_not_used.join("`, `");
-        list.push(format!("the depth of `{names}` is not in the scan: where it stands in the rig was not found"));
+        list.push(format!("the depth of `{names}` is not in the scan: where it stands in the rig is not known"));
     }
     if report.volume.is_some() && !report.full_turn && report.turned_deg > 0.0 {
         list.push(format!("the turn is not full: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));
