@@ -41,6 +41,10 @@ pub enum DropReason {
         /// Angle from the prediction, radians.
         angle: f64,
     },
+    /// Its sensor's place in the rig was not found.
+    SensorNotPlaced,
+    /// It does not fit where its sensor stands.
+    OffItsPlace,
     /// The subject was lost and fits elsewhere; the next frame must be tracked from there.
     Unconfirmed,
 }
@@ -66,6 +70,8 @@ impl fmt::Display for DropReason {
                 let (mm, degrees) = (shift * 1e3, angle.to_degrees());
                 write!(f, "its pose departs {mm:.0} mm and {degrees:.1}° from the turn so far")
             }
+            Self::SensorNotPlaced => f.write_str("where its sensor stands was not found"),
+            Self::OffItsPlace => f.write_str("it does not fit where its sensor stands"),
             Self::Unconfirmed => f.write_str("lost: it fits elsewhere; the next frame must confirm that"),
         }
     }

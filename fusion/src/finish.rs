@@ -11,4 +11,5 @@ mod whole;
 #[cfg(test)]
 pub(crate) use {closing::close, whole::minimum_weight};
 
+pub(crate) use poses::settle_poses;
 pub use whole::finish;

@@ -30,6 +30,48 @@ pub struct VolumeReport {
     pub image_up: ImageSide,
 }
 
+/// A camera that was moved within a take.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MovedReport {
+    /// How long after the sensor's first frame, seconds.
+    pub after_s: f64,
+    /// How far, millimetres.
+    pub shift_mm: f64,
+    /// By what angle, degrees.
+    pub angle_deg: f64,
+}
+
+/// A sensor of a rig.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct SensorReport {
+    /// Its name.
+    pub name: String,
+    /// True where it was found where it stands; else it is not in the scan.
+    pub is_placed: bool,
+    /// Its frames with depth.
+    pub frames_seen: usize,
+    /// Those of them in the scan.
+    pub frames_fused: usize,
+    /// Standard deviation of its depth noise, millimetres.
+    pub noise_mm: f64,
+    /// By how much its clock runs faster than the host's, parts in a million.
+    pub clock_drift_ppm: f64,
+    /// Its device times jump: its frames are placed by when they arrived.
+    pub clock_is_unsteady: bool,
+    /// Where it was found to stand in the rig's frame, metres, as a rig file has it. The leading sensor stays.
+    pub position_m: [f64; 3],
+    /// How it is turned there: axis times angle, degrees.
+    pub rotation_deg: [f64; 3],
+    /// How far that is from where the recording says, millimetres.
+    pub departs_mm: f64,
+    /// The same, degrees.
+    pub departs_deg: f64,
+    /// How far its single frames are from that place at the subject, median, millimetres.
+    pub spread_mm: f64,
+    /// Where it moved against the leading sensor within the take.
+    pub moved: Option<MovedReport>,
+}
+
 /// The decisions of the stage.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct FusionReport {
@@ -41,8 +83,11 @@ pub struct FusionReport {
     pub frames_fused: usize,
     /// Frames left out, with reasons.
     pub dropped: Vec<DroppedFrame>,
-    /// Sensors of the rig that gave depth but are not in the scan: it is made from the first sensor alone.
+    /// Sensors of the rig that gave depth but are not in the scan.
     pub sensors_not_used: Vec<String>,
+    /// The sensors of a rig; nothing for a single one.
+    #[serde(default)]
+    pub sensors: Vec<SensorReport>,
     /// Degrees turned about the axis from the first to the last fused frame.
     pub turned_deg: f64,
     /// True when the turn is at least 340°, or when the step that closes it is about as wide as the widest one in it.

@@ -9,6 +9,8 @@ use crate::{report::FusionReport, timings::Timings, tracking::Tracked};
 /// A frame of the scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedFrame {
+    /// Which sensor of the rig saw it.
+    pub sensor: usize,
     /// Index in the source.
     pub index: u64,
     /// Device time of the depth frame, nanoseconds.
@@ -25,7 +27,7 @@ pub struct TrackedFrame {
 pub struct Scan {
     /// The surface: normals, colours (where there was colour), attribute `filled`.
     pub mesh: Mesh,
-    /// The fused frames in the order of time.
+    /// The fused frames: those of the leading sensor in the order of time, then those of each other one.
     pub trajectory: Vec<TrackedFrame>,
     /// The decisions.
     pub report: FusionReport,
@@ -34,10 +36,18 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// The trajectory as TUM lines: `t tx ty tz qx qy qz qw`, t in seconds of device time, pose = scan_from_camera.
+    /// The trajectory as TUM lines: `t tx ty tz qx qy qz qw`, t in seconds of device time, pose = scan_from_camera. Of
+    /// several sensors, each with a clock of its own, the lines of each follow a comment that names it.
     pub fn trajectory_tum(&self) -> String {
         let mut text = String::new();
+        let several = self.trajectory.windows(2).any(|w| w[0].sensor != w[1].sensor);
+        let mut last = usize::MAX;
         for frame in &self.trajectory {
+            if several && frame.sensor != last {
+                let name = self.report.sensors.get(frame.sensor).map_or("", |s| s.name.as_str());
+                let _ = writeln!(text, "# sensor {name}");
+            }
+            last = frame.sensor;
             let (t, q) = (frame.scan_from_camera.translation.vector, frame.scan_from_camera.rotation);
             let (seconds, nanos) =
                 (frame.device_time_ns.div_euclid(1_000_000_000), frame.device_time_ns.rem_euclid(1_000_000_000));

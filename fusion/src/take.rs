@@ -5,7 +5,14 @@ mod fuser;
 mod live;
 mod model;
 mod preparer;
+mod survey;
+mod waiting;
 
-pub use fuse::{fuse, survey};
+pub(crate) use preparer::Preparer;
+pub(crate) use survey::survey_sensor;
+pub(crate) use waiting::{Waiting, spread};
+
+pub use fuse::fuse;
 pub use fuser::{Fuser, Outcome};
 pub use live::LiveFuser;
+pub use survey::survey;

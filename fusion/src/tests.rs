@@ -148,7 +148,7 @@ fn joint_optimisation_recovers_disturbed_poses() {
         .collect();
     poses[0] = truth[0];
     let before: f64 = truth.iter().zip(&poses).map(|(t, p)| difference(t, p).0).sum::<f64>() / 24.0;
-    let closing = close(&views, &mut poses, 8);
+    let closing = close(&views, &vec![0; views.len()], &mut poses, 8);
     let after: f64 = truth.iter().zip(&poses).map(|(t, p)| difference(t, p).0).sum::<f64>() / 24.0;
     assert!(before > 0.006 && after < 0.0008, "{before} -> {after}, {closing:?}");
     assert!(closing.seam_pairs > 0 && closing.seam_after < closing.seam_before);
@@ -214,9 +214,14 @@ fn a_surface_needs_more_weight_in_a_longer_take_of_a_subject_that_turns() {
 }
 
 #[test]
-fn a_rig_whose_other_sensors_are_not_fused_is_a_warning() {
+fn sensors_that_known_poses_do_not_place_are_a_warning() {
     let scene = Scene { with_floor: false, with_wall: false, ..Scene::new() };
-    let whole = FusionSettings { volume: Volume::All, closing_rounds: 0, refine_rounds: 0, ..settings() };
+    let pose = |f: &toile_capture::Frame| KnownPose {
+        device_time_ns: f.device_time_ns,
+        scan_from_camera: scene.figure_from_camera((6.0 * f.index as f64).to_radians()),
+    };
+    let poses = scene.frames(&steps(4, 6.0)).iter().map(pose).collect();
+    let whole = FusionSettings { volume: Volume::All, poses: Some(poses), ..settings() };
     let mut source = scene.source(&steps(4, 6.0));
     let fused = |source: &mut Memory| fuse(source, &whole, &|_| {}).unwrap().report;
     assert_eq!(fused(&mut source).sensors_not_used, [""; 0]);

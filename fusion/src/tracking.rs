@@ -18,13 +18,17 @@ mod tracker;
 mod trust;
 mod views;
 
-pub(crate) use axis::{Axis, find_axis, total_turn, widest_step};
-pub(crate) use equations::{NormalEquations, increment};
+pub(crate) use axis::{Axis, find_axis, swept_turn, widest_step};
+pub(crate) use equations::{NormalEquations, Residual, accumulate, increment};
 pub(crate) use kept::{Kept, KeptFrame, Past};
-pub(crate) use open_directions::{DEGENERATE, hold_open_directions};
-pub(crate) use registration::register;
-pub(crate) use samples::{Sample, samples};
+pub(crate) use motion::scaled;
+pub(crate) use open_directions::{DEGENERATE, conditioning, hold_open_directions};
+pub(crate) use registration::{CONVERGED, gate_of, register, surface_distance, tukey};
+pub(crate) use samples::{Sample, centroid, samples};
+pub(crate) use starts::best_of;
+pub(crate) use tracked::Located;
 pub(crate) use tracker::Tracker;
+pub(crate) use trust::{fits, trusted};
 pub(crate) use views::MAX_VIEWS;
 
 pub use approach::track;

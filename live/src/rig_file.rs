@@ -91,6 +91,14 @@ impl RigFile {
     }
 }
 
+/// The names of a file's sensors; `None` where a device's own counts.
+///
+/// # Errors
+/// A sentence where the file cannot be used.
+pub(crate) fn names(text: &str) -> Result<Vec<Option<String>>, String> {
+    Ok(parse(text)?.into_iter().map(|placed| placed.name).collect())
+}
+
 fn parse(text: &str) -> Result<Vec<Placed>, String> {
     let file: Text = toml::from_str(text).map_err(|e| e.message().to_string())?;
     if file.sensor.is_empty() {

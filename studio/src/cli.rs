@@ -36,6 +36,8 @@ pub enum Command {
     Import(commands::import::Import),
     /// Record a take from a camera, and see how much of the subject was seen
     Capture(commands::capture::Capture),
+    /// Find where the cameras of a rig stand, from a person who turns or from a chessboard
+    Calibrate(commands::calibrate::Calibrate),
     /// Show the contents of a recording, a folder or a subject, and whether it is healthy
     Inspect(commands::inspect::Inspect),
     /// Fuse takes into scans

@@ -53,6 +53,7 @@ impl Command {
         match self {
             Self::Import(c) => c.run(session),
             Self::Capture(c) => c.run(session),
+            Self::Calibrate(c) => c.run(session),
             Self::Inspect(c) => c.run(session),
             Self::Fuse(c) => c.run(session),
             Self::Fit(c) => c.run(session),
@@ -73,6 +74,7 @@ impl Command {
         match self {
             Self::Import(_) => "import",
             Self::Capture(_) => "capture",
+            Self::Calibrate(_) => "calibrate",
             Self::Inspect(_) => "inspect",
             Self::Fuse(_) => "fuse",
             Self::Fit(_) => "fit",

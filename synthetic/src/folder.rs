@@ -18,6 +18,10 @@ pub fn write_subject_folder(
     dir: &Path,
     progress: &(dyn Fn(f32) + Sync),
 ) -> Result<(), SyntheticError> {
+    if subject.settings.rig.sensors > 1 {
+        let reason = "folders of images hold one sensor; record a rig as a subject";
+        return Err(SyntheticError::setting("sensors", reason));
+    }
     for n in 0..subject.take_count() {
         let take = subject.take(n)?;
         let share = 1.0 / subject.take_count() as f32;

@@ -51,8 +51,8 @@ fn onto_disk(x: f32, z: f32) -> Point3<f32> {
     Point3::new(x * scale, 0.0, z * scale)
 }
 
-/// Floor and wall; they stand still. Room frame: the disk's axis is y, its top y = 0, the camera on the +z side.
-pub fn floor_and_wall() -> Mesh {
+/// Floor and, where sensors look from one side alone, a wall; they stand still. Room frame: the disk's axis is y, its top y = 0, the camera on the +z side.
+pub fn floor_and_wall(with_wall: bool) -> Mesh {
     let mut room = Mesh::default();
     let tiles = |length: f32| (length / TILE).round() as i32;
     for i in 0..tiles(2.0 * HALF_WIDTH) {
@@ -63,7 +63,7 @@ pub fn floor_and_wall() -> Mesh {
             let quad = [(x, z), (x, z + wide), (x + wide, z + wide), (x + wide, z)].map(|(x, z)| Point3::new(x, y, z));
             add_quad(&mut room, quad, if (i + j) % 2 == 0 { [176, 172, 164] } else { [170, 166, 160] });
         }
-        for j in 0..tiles(WALL_HEIGHT) {
+        for j in 0..if with_wall { tiles(WALL_HEIGHT) } else { 0 } {
             let y = -DISK_HEIGHT + j as f32 * TILE;
             let quad =
                 [(x, y), (x + wide, y), (x + wide, y + wide), (x, y + wide)].map(|(x, y)| Point3::new(x, y, WALL_Z));

@@ -2,7 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{SyntheticError, sensor::SensorPreset};
+use crate::{
+    SyntheticError,
+    motion::Motion,
+    rig_settings::{MAX_SENSORS, RigSettings},
+    sensor::SensorPreset,
+};
 
 /// Which half of the population a person is drawn from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -139,6 +144,12 @@ pub struct SyntheticSettings {
     pub degrees: f64,
     /// Frames a second, default 5.
     pub fps: f64,
+    /// How the disk moves; `twice` goes the degrees twice, `back-and-forth` there and back. Default one turn.
+    pub motion: Motion,
+    /// How far the disk's axis leans against the vertical, degrees; 0..8, default 0.
+    pub tilt_degrees: f64,
+    /// The sensors around the disk.
+    pub rig: RigSettings,
     /// The camera.
     pub sensor: SensorPreset,
     /// Camera to axis, metres; `None`: what suits the camera.
@@ -172,6 +183,9 @@ impl Default for SyntheticSettings {
             frames: 100,
             degrees: 366.0,
             fps: 5.0,
+            motion: Motion::Turn,
+            tilt_degrees: 0.0,
+            rig: RigSettings::default(),
             sensor: SensorPreset::Kinect2,
             distance_m: None,
             height_m: 0.95,
@@ -204,6 +218,14 @@ impl SyntheticSettings {
         within("frames", self.frames as f64, 2.0, 100_000.0)?;
         within("degrees", self.degrees, -7200.0, 7200.0)?;
         within("fps", self.fps, 0.01, 1000.0)?;
+        within("tilt_degrees", self.tilt_degrees, 0.0, 8.0)?;
+        within("sensors", self.rig.sensors as f64, 1.0, MAX_SENSORS as f64)?;
+        within("error_m", self.rig.error_m, 0.0, 1.0)?;
+        within("error_degrees", self.rig.error_degrees, 0.0, 30.0)?;
+        within("clock_drift_ppm", self.rig.clock_drift_ppm, -1e4, 1e4)?;
+        within("knock_m", self.rig.knock_m, 0.0, 0.2)?;
+        within("interference", self.rig.interference, 0.0, 0.5)?;
+        within("shake_degrees", self.rig.shake_degrees, 0.0, 0.3)?;
         within("distance_m", self.distance_m.unwrap_or(2.0), 1.0, 6.0)?;
         within("height_m", self.height_m, 0.1, 2.5)?;
         within("sway_degrees", self.sway_degrees, 0.0, 5.0)?;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::Point3;
+use serde_json::Value;
 use toile_capture::{ColorImage, DepthImage, DeviceIdentity, Frame, RgbImage, Rig, Sensor};
 use toile_character::{Joint, Pose, Skeleton};
 use toile_geometry::{Mesh, Rigid, camera::PinholeCamera};
@@ -10,8 +11,10 @@ use toile_geometry::{Mesh, Rigid, camera::PinholeCamera};
 use crate::{
     SyntheticError,
     dressing::dress,
+    interference::disturb,
     posture::pose_of_take,
     random::Random,
+    rig::{Stand, knock, leaning, rig_json, stands},
     sensor::{self, DEPTH_SCALE, NoiseSeed, TrueImage},
     settings::SyntheticSettings,
     subject::Subject,
@@ -19,9 +22,6 @@ use crate::{
     turntable::{Bend, Moment, moments},
     view::{Scene, Viewpoint},
 };
-
-/// Host time minus device time of the virtual device, nanoseconds.
-const LATENCY_NS: i64 = 8_000_000;
 
 /// One take of a subject.
 #[derive(Debug, Clone)]
@@ -40,13 +40,17 @@ pub struct Take {
     pub body: Mesh,
     /// The moments of the frames.
     pub moments: Vec<Moment>,
-    /// Where the camera stands in the room (disk's axis, disk's top).
+    /// Where the (first) camera stands in the room (disk's axis, disk's top).
     pub room_from_camera: Rigid,
     /// How sway and breath bend the true surface.
     pub bend: Bend,
     settings: SyntheticSettings,
     scene: Scene,
     noise_seed: u64,
+    /// The sensors of the rig.
+    stands: Vec<Stand>,
+    /// How the last of them is pushed aside in the middle of the take.
+    knock: Rigid,
 }
 
 impl Subject {
@@ -77,6 +81,7 @@ impl Take {
         );
         let joints = pose.joint_positions(&person.body.skeleton);
         let bend = Bend { hips: joints[Joint::Spine.index()], chest: joints[Joint::UpperChest.index()] };
+        let stands = stands(settings);
         let noise_seed = Random::new(settings.seed, &format!("take {index} noise")).seed();
         Self {
             index,
@@ -85,12 +90,14 @@ impl Take {
             skeleton: person.body.skeleton.clone(),
             surface,
             body,
-            moments: moments(settings, index),
-            room_from_camera: camera_stand(settings),
+            moments: moments(settings, index, &stands),
+            room_from_camera: stands[0].room_from_camera,
             bend,
             settings: settings.clone(),
-            scene: Scene::new(settings.room, noise_seed),
+            scene: Scene::new(settings.room.then_some(stands.len() < 2), leaning(settings), noise_seed),
             noise_seed,
+            knock: knock(settings, index),
+            stands,
         }
     }
 
@@ -99,26 +106,43 @@ impl Take {
         self.settings.sensor.camera()
     }
 
-    /// The virtual rig: one sensor, colour registered to depth.
+    /// The virtual rig as the recording has it: colour registered to depth; the sensors' places with their error.
     pub fn rig(&self) -> Rig {
         let preset = self.settings.sensor;
-        let identity = DeviceIdentity {
-            model: format!("synthetic {}", preset.name()),
-            serial: format!("SYN-{:08x}", self.settings.seed as u32),
-            firmware: env!("CARGO_PKG_VERSION").into(),
-            ..DeviceIdentity::default()
-        };
-        let sensor = Sensor {
-            name: "camera".into(),
-            identity,
+        let sensor = |(k, stand): (usize, &Stand)| Sensor {
+            name: stand.name.clone(),
+            identity: DeviceIdentity {
+                model: format!("synthetic {}", preset.name()),
+                serial: format!("SYN-{:08x}", (self.settings.seed as u32).wrapping_add(k as u32)),
+                firmware: env!("CARGO_PKG_VERSION").into(),
+                ..DeviceIdentity::default()
+            },
             depth: self.camera(),
             depth_scale: DEPTH_SCALE,
             color: Some(self.camera()),
             color_from_depth: Rigid::identity(),
-            rig_from_depth: Rigid::identity(),
+            rig_from_depth: stand.recorded,
             fps: self.settings.fps,
         };
-        Rig { sensors: vec![sensor] }
+        Rig { sensors: self.stands.iter().enumerate().map(sensor).collect() }
+    }
+
+    /// What is true of the rig; `None` for a single sensor.
+    pub(crate) fn rig_truth(&self) -> Option<Value> {
+        let knock = (self.settings.rig.knock_m > 0.0).then_some(self.knock);
+        (self.stands.len() > 1).then(|| rig_json(&self.stands, knock))
+    }
+
+    /// Where the camera of frame `index` stands in the room at that moment.
+    fn room_from_sensor(&self, index: usize) -> Rigid {
+        let moment = &self.moments[index];
+        let still =
+            if moment.sensor == 0 { self.room_from_camera } else { self.stands[moment.sensor].room_from_camera };
+        let aside = if moment.is_knocked { still * self.knock } else { still };
+        if self.settings.rig.shake_degrees == 0.0 {
+            return aside;
+        }
+        aside * Rigid::new(nalgebra::Vector3::zeros(), moment.shake)
     }
 
     /// Positions of the joints in the subject's frame at rest (without sway).
@@ -128,7 +152,7 @@ impl Take {
 
     /// Where the camera is for the subject at frame `index`.
     pub fn subject_from_camera(&self, index: usize) -> Rigid {
-        self.moments[index].subject_from_camera(&self.room_from_camera)
+        self.moments[index].subject_from_camera(&self.room_from_sensor(index))
     }
 
     /// The picture of frame `index`: true depth and shaded colour, row by row.
@@ -140,7 +164,7 @@ impl Take {
     pub fn look_through(&self, lens: &PinholeCamera, index: usize) -> (TrueImage, Vec<[u8; 3]>) {
         let moment = &self.moments[index];
         let bent = self.bend.apply(&self.surface.mesh.positions, moment);
-        let from = Viewpoint { room_from_camera: self.room_from_camera, angle: moment.angle, frame: index };
+        let from = Viewpoint { room_from_camera: self.room_from_sensor(index), angle: moment.angle, frame: index };
         self.scene.look(&self.surface.mesh, bent, lens, &from)
     }
 
@@ -152,38 +176,29 @@ impl Take {
         let (truth, pixels) = self.look(index);
         let lens = self.camera();
         let noise = NoiseSeed { seed: self.noise_seed, frame: index as u64 };
-        let values = if self.settings.noise {
+        let mut values = if self.settings.noise {
             sensor::measure(self.settings.sensor, &truth, noise)
         } else {
             sensor::exact(&truth)
         };
+        if self.stands.len() > 1 {
+            disturb(&mut values, (lens.width, lens.height), self.settings.rig.interference, noise);
+        }
         let color = RgbImage { width: lens.width, height: lens.height, pixels };
         let jpeg = encode_jpeg(&color, self.settings.jpeg_quality)
             .map_err(|reason| SyntheticError::Encode { index, reason })?;
-        let time = self.moments[index].time_ns;
+        let moment = &self.moments[index];
         Ok(Frame {
-            sensor: 0,
+            sensor: moment.sensor,
             index: index as u64,
-            device_frame: index as u64,
+            device_frame: (index / self.stands.len()) as u64,
             lost_before: 0,
-            device_time_ns: time,
-            host_time_ns: time + LATENCY_NS,
+            device_time_ns: moment.time_ns,
+            host_time_ns: moment.host_time_ns,
             depth: Some(Arc::new(DepthImage { width: lens.width, height: lens.height, values })),
             color: Some(ColorImage::Jpeg(jpeg.into())),
         })
     }
-}
-
-/// The camera looks along −z of the room, tilted and turned a little as a tripod by hand is.
-fn camera_stand(settings: &SyntheticSettings) -> Rigid {
-    let mut random = Random::new(settings.seed, "camera");
-    let (tilt, yaw) = (random.range(-1.5, 1.5).to_radians(), random.range(-1.5, 1.5).to_radians());
-    let level = Matrix3::new(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0);
-    let level = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(level));
-    let aim = UnitQuaternion::from_euler_angles(tilt, yaw, 0.0);
-    let distance = settings.distance_m.unwrap_or_else(|| settings.sensor.usual_distance());
-    let place = Vector3::new(random.range(-0.03, 0.03), settings.height_m, distance);
-    Rigid::from_parts(place.into(), aim * level)
 }
 
 fn encode_jpeg(image: &RgbImage, quality: u8) -> Result<Vec<u8>, String> {

@@ -95,6 +95,9 @@ pub fn write_take(take: &Take, dir: &Path) -> Result<(), SyntheticError> {
     }
     put("poses.txt", poses_text(take).as_bytes())?;
     put("pose.json", pose_json(take).to_string().as_bytes())?;
+    if let Some(rig) = take.rig_truth() {
+        put("rig.json", format!("{rig:#}\n").as_bytes())?;
+    }
     if take.moments.iter().any(|m| m.pitch != 0.0 || m.breath != 0.0) {
         put("sway.txt", sway_text(take).as_bytes())?;
     }

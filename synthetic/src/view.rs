@@ -20,6 +20,8 @@ const GRAIN: f32 = 1.5;
 pub(crate) struct Scene {
     disk: Mesh,
     room: Option<Mesh>,
+    /// The room in the frame of the disk, whose axis may lean.
+    leaning: Rigid,
     noise_seed: u64,
 }
 
@@ -34,11 +36,12 @@ pub(crate) struct Viewpoint {
 }
 
 impl Scene {
-    /// Disk, and floor and wall where `with_room`.
-    pub fn new(with_room: bool, noise_seed: u64) -> Self {
+    /// Disk, and where there is a room its floor, with a wall or without.
+    pub fn new(with_wall: Option<bool>, leaning: Rigid, noise_seed: u64) -> Self {
         Self {
             disk: with_normals(room::disk()),
-            room: with_room.then(|| with_normals(room::floor_and_wall())),
+            room: with_wall.map(|wall| with_normals(room::floor_and_wall(wall))),
+            leaning,
             noise_seed,
         }
     }
@@ -62,8 +65,8 @@ impl Scene {
             Faces { raster: rasterize(&self.disk, &camera(turned)), mesh: &self.disk, turn: turn.cast() },
         ];
         if let Some(room) = &self.room {
-            let raster = rasterize(room, &camera(Rigid::identity()));
-            seen.push(Faces { raster, mesh: room, turn: UnitQuaternion::identity() });
+            let raster = rasterize(room, &camera(self.leaning));
+            seen.push(Faces { raster, mesh: room, turn: self.leaning.rotation.cast() });
         }
         self.compose(&seen, lens, from)
     }

@@ -49,13 +49,14 @@ struct Node<'a> {
     points: Vec<Sample>,
 }
 
-/// Optimises `poses` (model_from_camera of each view, in the order of time) together. The first pose stays.
-pub fn close(views: &[DepthView], poses: &mut [Rigid], rounds: usize) -> Closing {
+/// Optimises `poses` (model_from_camera of each view, those of each sensor in the order of time) together. The first
+/// pose stays.
+pub fn close(views: &[DepthView], sensors: &[usize], poses: &mut [Rigid], rounds: usize) -> Closing {
     let nodes: Vec<Node> = views.par_iter().map(|view| Node { view, points: samples(view, POINTS) }).collect();
     let center = subject_center(&nodes, poses);
     let pairs = overlapping_pairs(&nodes, poses);
-    let half = poses.len() / 2;
-    let seam = |p: &(usize, usize)| p.1 - p.0 > half;
+    let views_of = |sensor: usize| sensors.iter().filter(|s| **s == sensor).count();
+    let seam = |p: &(usize, usize)| sensors[p.0] == sensors[p.1] && p.1 - p.0 > views_of(sensors[p.0]) / 2;
     let mut closing =
         Closing { pairs: pairs.len(), seam_pairs: pairs.iter().filter(|p| seam(p)).count(), ..Closing::default() };
     if poses.len() < 2 || pairs.is_empty() {

@@ -42,12 +42,12 @@ pub(crate) fn final_field(fuser: &mut Fuser) -> Result<Tsdf, FusionError> {
 pub(crate) fn fuse_again(fuser: &mut Fuser, frames: &[usize], with_color: bool) -> Result<Tsdf, FusionError> {
     let with_color = with_color && fuser.kept.has_color();
     let mut field = fuser.model.empty_field(with_color);
-    let window = fuser.model.window;
     let colored = fuser.kept.len().div_ceil(MAX_COLORED).max(1);
-    let (kept, sensor, clock) = (&fuser.kept.frames, &fuser.sensor, &mut fuser.clock);
+    let (kept, sensors, clock) = (&fuser.kept.frames, &fuser.sensors, &mut fuser.clock);
     let step = if with_color { "integrate with colour" } else { "integrate again" };
     for group in frames.chunks(GROUP) {
-        let view = |&i: &usize| colored_view(&kept[i], sensor, window, with_color && i.is_multiple_of(colored));
+        let view =
+            |&i: &usize| colored_view(&kept[i], &sensors[kept[i].sensor], with_color && i.is_multiple_of(colored));
         let views: Vec<DepthView> = clock.time("prepare again", || group.par_iter().map(view).collect());
         for (&i, view) in group.iter().zip(&views) {
             clock.time(step, || integrate(&mut field, view, &kept[i].model_from_camera))?;
@@ -56,8 +56,8 @@ pub(crate) fn fuse_again(fuser: &mut Fuser, frames: &[usize], with_color: bool) 
     Ok(field)
 }
 
-fn colored_view(kept: &KeptFrame, sensor: &Sensor, window: usize, with_color: bool) -> DepthView {
-    let mut view = kept.depth.view(window);
+fn colored_view(kept: &KeptFrame, sensor: &Sensor, with_color: bool) -> DepthView {
+    let mut view = kept.view();
     if let Some(image) = decode_color(kept.color.as_ref(), kept.index).filter(|_| with_color) {
         view.add_colors(&image, sensor);
     }

@@ -9,7 +9,7 @@ use crate::{
     Prior,
     report::FusionReport,
     take::Fuser,
-    tracking::{Axis, find_axis, total_turn, widest_step},
+    tracking::{Axis, find_axis, swept_turn, widest_step},
 };
 
 /// A turn of this many degrees is a full one.
@@ -25,9 +25,9 @@ pub(crate) fn place(fuser: &Fuser, raw: &Mesh, report: &mut FusionReport) -> Rig
     if settings.prior == Prior::None && volume.is_none() || settings.poses.is_some() {
         return Rigid::identity();
     }
-    let poses = fuser.kept.poses();
+    let poses: Vec<Rigid> = fuser.kept.leading().iter().map(|k| k.model_from_camera).collect();
     let found = find_axis(&poses);
-    let turned = found.map_or(0.0, |a| total_turn(&a, &poses));
+    let turned = found.map_or(0.0, |a| swept_turn(&a, &poses));
     let widest = found.map_or(0.0, |a| widest_step(&a, &poses));
     report_turn(fuser, (turned, widest), report);
     // Without a volume the model's frame is the first camera's, whose +Y points down.
@@ -50,7 +50,7 @@ pub(crate) fn place(fuser: &Fuser, raw: &Mesh, report: &mut FusionReport) -> Rig
 
 /// Reports the turn from the first to the last frame, and the widest step in it, radians.
 fn report_turn(fuser: &Fuser, (turned, widest): (f64, f64), report: &mut FusionReport) {
-    let frames = &fuser.kept.frames;
+    let frames = fuser.kept.leading();
     let span = frames.last().map_or(0, |k| k.device_time_ns) - frames[0].device_time_ns;
     report.turned_deg = turned.abs().to_degrees();
     // Eight views in steps of 45° go all round, although the last one is 315° from the first.

@@ -27,10 +27,11 @@ pub(crate) fn close_turn(fuser: &mut Fuser, report: &mut FusionReport) {
         return;
     }
     let keys = fuser.kept.key_frames(MAX_CLOSED);
-    let (kept, window) = (&fuser.kept, fuser.model.window);
-    let views: Vec<DepthView> = keys.par_iter().map(|&i| kept.frames[i].depth.view(window)).collect();
+    let kept = &fuser.kept;
+    let views: Vec<DepthView> = keys.par_iter().map(|&i| kept.frames[i].view()).collect();
+    let sensors: Vec<usize> = keys.iter().map(|&i| kept.frames[i].sensor).collect();
     let mut poses: Vec<Rigid> = keys.iter().map(|&i| kept.frames[i].model_from_camera).collect();
-    let closing = fuser.clock.time("close", || close(&views, &mut poses, rounds));
+    let closing = fuser.clock.time("close", || close(&views, &sensors, &mut poses, rounds));
     report.closing_pairs = closing.pairs;
     report.seam_pairs = closing.seam_pairs;
     report.seam_before_mm = closing.seam_before * 1e3;
@@ -45,9 +46,9 @@ pub(crate) fn close_turn(fuser: &mut Fuser, report: &mut FusionReport) {
 pub(crate) fn refine(fuser: &mut Fuser) -> Result<(), FusionError> {
     let keys = fuser.kept.key_frames(MAX_REFINED);
     let field = fuse_again(fuser, &keys, false)?;
-    let (kept, window) = (&fuser.kept, fuser.model.window);
+    let kept = &fuser.kept;
     let registered = |&i: &usize| {
-        let (view, before) = (kept.frames[i].depth.view(window), kept.frames[i].model_from_camera);
+        let (view, before) = (kept.frames[i].view(), kept.frames[i].model_from_camera);
         let tracked = register(&field, &samples(&view, POINTS), &before);
         if tracked.overlap > 0.5 && tracked.conditioning > DEGENERATE { tracked.model_from_camera } else { before }
     };
@@ -57,15 +58,32 @@ pub(crate) fn refine(fuser: &mut Fuser) -> Result<(), FusionError> {
     Ok(())
 }
 
+/// Closes the turn of the frames so far, registers them to the whole and fuses the model again: for what follows to be
+/// registered to it.
+///
+/// # Errors
+/// [`FusionError::TooLarge`] where the field outgrows its index.
+pub(crate) fn settle_poses(fuser: &mut Fuser) -> Result<(), FusionError> {
+    close_turn(fuser, &mut FusionReport::default());
+    if fuser.settings.refine_rounds > 0 {
+        refine(fuser)?;
+    }
+    let all: Vec<usize> = (0..fuser.kept.len()).collect();
+    fuser.model.field = fuse_again(fuser, &all, false)?;
+    Ok(())
+}
+
 /// Gives the key frames new poses; the frames between follow their neighbours smoothly.
 fn follow(kept: &mut Kept, keys: &[usize], poses: &[Rigid]) {
-    let step = keys.get(1).map_or(1, |second| second - keys[0]);
     let corrections: Vec<Rigid> =
         keys.iter().zip(poses).map(|(&i, pose)| pose * kept.frames[i].model_from_camera.inverse()).collect();
+    let sensors: Vec<usize> = kept.frames.iter().map(|k| k.sensor).collect();
     for (i, frame) in kept.frames.iter_mut().enumerate() {
-        let (k, share) = (i / step, (i % step) as f64 / step as f64);
-        let next = corrections.get(k + 1).unwrap_or(&corrections[k]);
-        frame.model_from_camera = between(&corrections[k], next, share) * frame.model_from_camera;
+        let k = keys.partition_point(|key| *key <= i) - 1;
+        // Behind a sensor's last key frame there is none to go to: the next one is another sensor's.
+        let next = keys.get(k + 1).filter(|&&next| sensors[next] == sensors[i]);
+        let (next, share) = next.map_or((k, 0.0), |next| (k + 1, (i - keys[k]) as f64 / (next - keys[k]) as f64));
+        frame.model_from_camera = between(&corrections[k], &corrections[next], share) * frame.model_from_camera;
     }
 }
 

@@ -6,6 +6,7 @@ use crate::{
     drop_reason::DropReason,
     field::VOXELS,
     report::{FusionReport, VolumeReport},
+    rig::{rig_warnings, settle},
     settings::KNOWN_POSE_WITHIN_NS,
     take::Fuser,
     timings::Timings,
@@ -29,6 +30,7 @@ pub(crate) fn summarise(fuser: &mut Fuser, field: &FieldSize, report: &mut Fusio
     report.frames_fused = fuser.kept.len();
     report.dropped = std::mem::take(&mut fuser.log.dropped);
     report.sensors_not_used = std::mem::take(&mut fuser.log.sensors_not_used);
+    report.sensors = settle(fuser);
     report.volume = fuser.volume.as_ref().map(|v| VolumeReport {
         radius_m: v.radius,
         floor_found: v.floor.is_some(),
@@ -40,6 +42,8 @@ pub(crate) fn summarise(fuser: &mut Fuser, field: &FieldSize, report: &mut Fusio
     report.truncation_mm = f64::from(field.truncation) * 1e3;
     summarise_tracking(fuser, report);
     report.warnings = warnings(report);
+    let leader = &fuser.sensors[fuser.kept.leading()[0].sensor].name;
+    report.warnings.extend(rig_warnings(&report.sensors, leader));
     timings(fuser, field)
 }
 
@@ -69,7 +73,7 @@ fn warnings(report: &FusionReport) -> Vec<String> {
     let mut list = Vec::new();
     if !report.sensors_not_used.is_empty() {
         let names = report.sensors_not_used.join("`, `");
-        list.push(format!("the scan is made from the rig's first sensor alone: the depth of `{names}` is not used"));
+        list.push(format!("the depth of `{names}` is not in the scan: where it stands in the rig is not known"));
     }
     if report.volume.is_some() && !report.full_turn && report.turned_deg > 0.0 {
         list.push(format!("the turn is not full: {:.0}° of 360°; the far side is filled, not seen", report.turned_deg));

@@ -53,6 +53,7 @@ pub fn finish(mut fuser: Fuser, progress: &(dyn Fn(f32) + Sync)) -> Result<Scan,
     progress(1.0);
     let timings = summarise(&mut fuser, &size, &mut report);
     let trajectory = fuser.kept.frames.into_iter().map(|k| TrackedFrame {
+        sensor: k.sensor,
         index: k.index,
         device_time_ns: k.device_time_ns,
         scan_from_camera: scan_from_model * k.model_from_camera,

@@ -1,55 +1,27 @@
 //! A whole take at once: read, survey, push every frame, finish.
 
-use std::{collections::BTreeSet, sync::Arc};
+use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-use toile_capture::{DepthImage, Frame, Rig, Source, depth_codec};
+use toile_capture::{Rig, Source};
 
 use super::{
     fuser::{Fuser, Outcome},
-    preparer::{Filter, first_sensor},
+    preparer::usable_sensor,
+    survey::survey_sensor,
+    waiting::{Waiting, spread},
 };
 use crate::{
     FusionError, FusionSettings, Scan, Volume,
     drop_reason::DropReason,
     finish::finish,
     report::DroppedFrame,
-    subject::{SURVEY_FRAMES, SubjectVolume, find_volume},
+    rig::{Member, join},
     timings::Stopwatch,
     tracking::MAX_VIEWS,
 };
 
 /// Frames after this many wait packed, so that a long take fits in memory.
 const UNPACKED: usize = 128;
-
-/// A frame that waits for the volume to be found.
-struct Waiting {
-    frame: Frame,
-    packed: Vec<u8>,
-}
-
-impl Waiting {
-    fn new(mut frame: Frame, pack: bool) -> Self {
-        let packed = frame.depth.as_ref().filter(|_| pack).and_then(|d| depth_codec::encode(d).ok());
-        if packed.is_some() {
-            frame.depth = None;
-        }
-        Self { frame, packed: packed.unwrap_or_default() }
-    }
-
-    fn has_depth(&self) -> bool {
-        self.frame.depth.is_some() || !self.packed.is_empty()
-    }
-
-    /// The frame with its depth.
-    fn unpacked(&self) -> Frame {
-        let mut frame = self.frame.clone();
-        if !self.packed.is_empty() {
-            frame.depth = depth_codec::decode(&self.packed).ok().map(Arc::<DepthImage>::new);
-        }
-        frame
-    }
-}
 
 /// Fuses a whole take: surveys it for the subject's volume, pushes every frame, finishes.
 ///
@@ -63,18 +35,41 @@ pub fn fuse(
 ) -> Result<Scan, FusionError> {
     let rig = source.rig().clone();
     let mut clock = Stopwatch::new();
-    let ReadFrames { frames, unreadable, other_sensors } = clock.time("read", || read_all(source, progress))?;
+    let ReadFrames { leader, frames, unreadable, others } = clock.time("read", || read_all(source, progress))?;
     let volume = match settings.volume {
         Volume::All => None,
-        Volume::Auto => Some(clock.time("survey", || survey(&rig, &spread(&frames), settings))?),
+        Volume::Auto => Some(clock.time("survey", || survey_sensor(&rig, leader, &spread(&frames), settings))?),
     };
-    let mut fuser = Fuser::new(&rig, volume, settings.clone())?;
+    let mut fuser = Fuser::led_by(&rig, leader, volume, settings.clone())?;
     fuser.clock = clock;
     fuser.log.seen += unreadable.len();
     fuser.log.dropped.extend(unreadable);
-    fuser.log.sensors_not_used = other_sensors;
+    let arrivals: Vec<(i64, i64)> = frames.iter().map(Waiting::times).collect();
+    fuser.log.leading_seen = frames.len();
     push_all(&mut fuser, frames, progress)?;
+    join_others(&mut fuser, &rig, others, &arrivals)?;
     finish(fuser, &|x| progress(0.5 + 0.5 * x))
+}
+
+/// Fuses the frames of the rig's other sensors.
+fn join_others(
+    fuser: &mut Fuser,
+    rig: &Rig,
+    others: Vec<(usize, Vec<Waiting>)>,
+    arrivals: &[(i64, i64)],
+) -> Result<(), FusionError> {
+    // Known poses are those of the leading sensor.
+    let joins = fuser.settings.poses.is_none() && !fuser.kept.is_empty();
+    let mut members = Vec::new();
+    for (sensor, frames) in others {
+        if joins && usable_sensor(rig, sensor).is_ok() {
+            members.push(Member::new(rig, sensor, frames, &fuser.settings));
+        } else {
+            let name = rig.sensors.get(sensor).map_or_else(|| format!("number {sensor}"), |s| s.name.clone());
+            fuser.log.sensors_not_used.push(name);
+        }
+    }
+    if members.is_empty() { Ok(()) } else { join(fuser, rig, members, arrivals) }
 }
 
 /// Pushes every frame; a few views are tried again where they could not be placed at once.
@@ -95,70 +90,50 @@ fn push_all(fuser: &mut Fuser, frames: Vec<Waiting>, progress: &(dyn Fn(f32) + S
     if dropped.is_empty() { Ok(()) } else { fuser.retry(dropped) }
 }
 
-/// Frames with depth spread over the take.
-fn spread(frames: &[Waiting]) -> Vec<Frame> {
-    let with_depth: Vec<&Waiting> = frames.iter().filter(|f| f.has_depth()).collect();
-    let step = with_depth.len().div_ceil(SURVEY_FRAMES).max(1);
-    with_depth.into_iter().step_by(step).map(Waiting::unpacked).collect()
-}
-
 /// The content of a source.
 struct ReadFrames {
-    /// The frames of the first sensor.
+    /// The sensor that leads: the first one with depth.
+    leader: usize,
+    /// Its frames.
     frames: Vec<Waiting>,
     /// Frames that could not be read.
     unreadable: Vec<DroppedFrame>,
-    /// Names of the other sensors that gave depth.
-    other_sensors: Vec<String>,
+    /// The frames of the other sensors that gave depth.
+    others: Vec<(usize, Vec<Waiting>)>,
 }
 
 /// Reads all frames.
 fn read_all(source: &mut dyn Source, progress: &(dyn Fn(f32) + Sync)) -> Result<ReadFrames, FusionError> {
     let total = source.frame_count();
-    let (mut frames, mut unreadable): (Vec<Waiting>, _) = (Vec::new(), Vec::new());
-    let mut others = BTreeSet::new();
-    let mut failures = 0;
+    let (mut sensors, mut unreadable): (BTreeMap<usize, Vec<Waiting>>, _) = (BTreeMap::new(), Vec::new());
+    let (mut count, mut failures) = (0, 0);
     loop {
         match source.next_frame() {
-            Ok(Some(frame)) if frame.sensor == 0 => {
-                let pack = frames.len() >= UNPACKED;
-                frames.push(Waiting::new(frame, pack));
+            Ok(Some(frame)) => {
+                let frames = sensors.entry(frame.sensor).or_default();
+                frames.push(Waiting::new(frame, count >= UNPACKED));
+                count += 1;
             }
-            Ok(Some(frame)) => others.extend(frame.depth.map(|_| frame.sensor)),
             Ok(None) => break,
             Err(error) => {
                 failures += 1;
-                if failures > 20 && failures > frames.len() {
+                if failures > 20 && failures > count {
                     return Err(error.into());
                 }
-                let index = (frames.len() + unreadable.len()) as u64;
-                unreadable.push(DroppedFrame {
-                    index,
-                    device_time_ns: 0,
-                    reason: DropReason::Unreadable(error.to_string()),
-                });
+                let index = (count + unreadable.len()) as u64;
+                let reason = DropReason::Unreadable(error.to_string());
+                unreadable.push(DroppedFrame { index, device_time_ns: 0, reason });
             }
         }
         if let Some(total) = total {
-            progress(0.1 * (frames.len() as f32 / total.max(1) as f32).min(1.0));
+            progress(0.1 * (count as f32 / total.max(1) as f32).min(1.0));
         }
     }
-    if !frames.iter().any(Waiting::has_depth) {
-        return Err(FusionError::NoDepth { frames: frames.len() });
-    }
-    let name = |k: usize| source.rig().sensors.get(k).map_or_else(|| format!("number {k}"), |s| s.name.clone());
-    Ok(ReadFrames { frames, unreadable, other_sensors: others.into_iter().map(name).collect() })
-}
-
-/// Finds the subject's volume in frames spread over the take.
-///
-/// # Errors
-/// [`FusionError::NobodyInIt`], or a calibration that cannot be used.
-pub fn survey(rig: &Rig, frames: &[Frame], settings: &FusionSettings) -> Result<SubjectVolume, FusionError> {
-    let filter = Filter::new(first_sensor(rig)?, settings);
-    let with_depth: Vec<&Frame> = frames.iter().filter(|f| f.depth.is_some()).collect();
-    let step = with_depth.len().div_ceil(SURVEY_FRAMES).max(1);
-    let chosen: Vec<&Frame> = with_depth.into_iter().step_by(step).collect();
-    let depths: Vec<Vec<f32>> = chosen.par_iter().filter_map(|f| filter.apply(f)).collect();
-    find_volume(&filter.rectifier.camera, &depths)
+    let with_depth = |frames: &[Waiting]| frames.iter().any(Waiting::has_depth);
+    let Some(leader) = sensors.iter().find(|s| with_depth(s.1)).map(|s| *s.0) else {
+        return Err(FusionError::NoDepth { frames: count });
+    };
+    let frames = sensors.remove(&leader).unwrap_or_default();
+    let others = sensors.into_iter().filter(|s| with_depth(&s.1)).collect();
+    Ok(ReadFrames { leader, frames, unreadable, others })
 }

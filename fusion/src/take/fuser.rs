@@ -5,7 +5,7 @@ use toile_geometry::{Mesh, Rigid};
 
 use super::{
     model::Model,
-    preparer::{MIN_PIXELS, Preparer, first_sensor},
+    preparer::{MIN_PIXELS, Preparer, usable_sensor},
 };
 use crate::{
     FusionError, FusionSettings,
@@ -13,6 +13,7 @@ use crate::{
     field::extract_surface,
     frame::{CutDepth, DepthView},
     report::DroppedFrame,
+    rig::RigFound,
     subject::SubjectVolume,
     timings::Stopwatch,
     tracking::{Kept, KeptFrame, Past, Tracked, Tracker},
@@ -41,6 +42,8 @@ pub(crate) struct Log {
     /// Frames that were pushed or could not be read.
     pub seen: usize,
     pub dropped: Vec<DroppedFrame>,
+    /// Those of the leading sensor.
+    pub leading_seen: usize,
     /// Names of sensors whose depth is not fused.
     pub sensors_not_used: Vec<String>,
 }
@@ -49,13 +52,16 @@ pub(crate) struct Log {
 /// and the model with it are there when [`Fuser::push`] returns.
 pub struct Fuser {
     pub(crate) settings: FusionSettings,
-    pub(crate) sensor: Sensor,
+    /// The sensors of the rig.
+    pub(crate) sensors: Vec<Sensor>,
     pub(crate) volume: Option<SubjectVolume>,
     preparer: Preparer,
     tracker: Tracker,
     pub(crate) model: Model,
     pub(crate) kept: Kept,
     pub(crate) log: Log,
+    /// Where the other sensors of the rig stand.
+    pub(crate) rig: RigFound,
     pub(crate) clock: Stopwatch,
 }
 
@@ -65,18 +71,32 @@ impl Fuser {
     /// # Errors
     /// Settings out of range, or a calibration that cannot be used.
     pub fn new(rig: &Rig, volume: Option<SubjectVolume>, settings: FusionSettings) -> Result<Self, FusionError> {
-        let sensor = first_sensor(rig)?.clone();
+        Self::led_by(rig, 0, volume, settings)
+    }
+
+    /// The same for another sensor.
+    ///
+    /// # Errors
+    /// Those of [`Fuser::new`].
+    pub(crate) fn led_by(
+        rig: &Rig,
+        leader: usize,
+        volume: Option<SubjectVolume>,
+        settings: FusionSettings,
+    ) -> Result<Self, FusionError> {
+        let sensor = usable_sensor(rig, leader)?;
         settings.check()?;
         let first = volume.as_ref().map_or_else(Rigid::identity, |v| v.model_from_camera);
         Ok(Self {
-            preparer: Preparer::new(&sensor, &settings, volume.clone()),
-            tracker: Tracker::new(&settings, &sensor, first),
+            preparer: Preparer::new(sensor, &settings, volume.clone()),
+            tracker: Tracker::new(&settings, sensor, first),
             model: Model::new(&settings),
             kept: Kept::default(),
             log: Log::default(),
             clock: Stopwatch::new(),
             settings,
-            sensor,
+            sensors: rig.sensors.clone(),
+            rig: RigFound::default(),
             volume,
         })
     }
@@ -99,7 +119,7 @@ impl Fuser {
         };
         self.model.integrate(&view, &located.model_from_camera, &mut self.clock)?;
         self.tracker.follow(frame, located.model_from_camera);
-        self.kept.frames.push(KeptFrame::new(frame, depth, &located));
+        self.kept.frames.push(KeptFrame::new(frame, depth, self.model.window, &located));
         Ok(Outcome::Fused { model_from_camera: located.model_from_camera, tracked: located.tracked })
     }
 

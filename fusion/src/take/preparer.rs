@@ -52,27 +52,40 @@ impl Preparer {
     /// # Errors
     /// Why the frame cannot be used.
     pub(crate) fn prepare(&self, frame: &Frame, clock: &mut Stopwatch) -> Result<CutDepth, DropReason> {
-        let camera = &self.filter.rectifier.camera;
         let depth = clock.time("filter", || self.filter.apply(frame)).ok_or(DropReason::NoDepth)?;
-        let cut = clock.time("cut", || match &self.volume {
-            Some(volume) => CutDepth::new(camera, &volume.cut(camera, &depth), self.depth_scale),
-            None => CutDepth::new(camera, &depth, self.depth_scale),
-        });
-        let pixels = cut.count();
-        if pixels < MIN_PIXELS {
-            return Err(DropReason::TooFewPixels { pixels });
+        enough(clock.time("cut", || self.cut_to(&depth, self.volume.as_ref())))
+    }
+
+    /// The depth of a frame in a part of space.
+    ///
+    /// # Errors
+    /// Why the frame cannot be used.
+    pub(crate) fn cut(&self, frame: &Frame, within: Option<&SubjectVolume>) -> Result<CutDepth, DropReason> {
+        let depth = self.filter.apply(frame).ok_or(DropReason::NoDepth)?;
+        enough(self.cut_to(&depth, within))
+    }
+
+    fn cut_to(&self, depth: &[f32], within: Option<&SubjectVolume>) -> CutDepth {
+        let camera = &self.filter.rectifier.camera;
+        match within {
+            Some(volume) => CutDepth::new(camera, &volume.cut(camera, depth), self.depth_scale),
+            None => CutDepth::new(camera, depth, self.depth_scale),
         }
-        Ok(cut)
     }
 }
 
-/// The sensor of a rig that is fused.
+fn enough(cut: CutDepth) -> Result<CutDepth, DropReason> {
+    let pixels = cut.count();
+    if pixels < MIN_PIXELS { Err(DropReason::TooFewPixels { pixels }) } else { Ok(cut) }
+}
+
+/// A sensor of a rig that can be fused.
 ///
 /// # Errors
 /// [`FusionError::Calibration`] where there is none, or its calibration cannot be used.
-pub(crate) fn first_sensor(rig: &Rig) -> Result<&Sensor, FusionError> {
-    let wrong = |reason: &str| FusionError::Calibration { sensor: 0, reason: reason.into() };
-    let sensor = rig.sensors.first().ok_or_else(|| wrong("the source names no sensor"))?;
+pub(crate) fn usable_sensor(rig: &Rig, index: usize) -> Result<&Sensor, FusionError> {
+    let wrong = |reason: &str| FusionError::Calibration { sensor: index, reason: reason.into() };
+    let sensor = rig.sensors.get(index).ok_or_else(|| wrong("the source names no sensor"))?;
     if !sensor.depth.is_valid() || sensor.depth_scale.is_nan() || sensor.depth_scale <= 0.0 {
         return Err(wrong("image size, focal length or depth scale is not positive"));
     }

@@ -74,7 +74,14 @@ pub fn widest_step(axis: &Axis, poses: &[Rigid]) -> f64 {
     poses.windows(2).map(|w| axis.angle(&(w[1] * w[0].inverse())).abs()).fold(0.0, f64::max)
 }
 
-/// Total turn about the axis over poses in order, radians.
-pub fn total_turn(axis: &Axis, poses: &[Rigid]) -> f64 {
-    poses.windows(2).map(|w| axis.angle(&(w[1] * w[0].inverse()))).sum()
+/// The turn about the axis that poses in order sweep, from the least to the most turned one, radians: of a disk that goes
+/// back and forth the way forth, of one that goes round twice both turns.
+pub fn swept_turn(axis: &Axis, poses: &[Rigid]) -> f64 {
+    let mut angle = 0.0;
+    let mut ends = (0.0f64, 0.0f64);
+    for pair in poses.windows(2) {
+        angle += axis.angle(&(pair[1] * pair[0].inverse()));
+        ends = (ends.0.min(angle), ends.1.max(angle));
+    }
+    ends.1 - ends.0
 }

@@ -4,7 +4,10 @@ use toile_capture::{ColorImage, Frame};
 use toile_geometry::{Rigid, statistics::median};
 
 use super::tracked::{Located, Tracked};
-use crate::{field::Tsdf, frame::CutDepth};
+use crate::{
+    field::Tsdf,
+    frame::{CutDepth, DepthView},
+};
 
 /// An earlier frame that looks from within this angle shows the same surface, radians.
 const SAME_VIEW: f64 = 0.5;
@@ -13,17 +16,23 @@ const USUAL: usize = 31;
 
 /// A frame of the model.
 pub(crate) struct KeptFrame {
+    /// Which sensor of the rig saw it.
+    pub sensor: usize,
     pub index: u64,
     pub device_time_ns: i64,
+    /// Time by the clock that all sensors of the rig are brought to, nanoseconds.
+    pub time_ns: i64,
     /// Empty where a live take has forgotten it.
     pub depth: CutDepth,
+    /// Half width of the averaging of its normals, pixels.
+    pub window: usize,
     pub color: Option<ColorImage>,
     pub model_from_camera: Rigid,
     /// `None` for known poses and the first frame.
     pub tracked: Option<Tracked>,
 }
 
-/// The frames of the model in the order of time.
+/// The frames of the model: those of the leading sensor, then those of each other one, each in the order of time.
 #[derive(Default)]
 pub(crate) struct Kept {
     pub frames: Vec<KeptFrame>,
@@ -38,15 +47,23 @@ pub(crate) struct Past<'a> {
 
 impl KeptFrame {
     /// A frame with its prepared depth and its pose.
-    pub(crate) fn new(frame: &Frame, depth: CutDepth, located: &Located) -> Self {
+    pub(crate) fn new(frame: &Frame, depth: CutDepth, window: usize, located: &Located) -> Self {
         Self {
+            sensor: frame.sensor,
             index: frame.index,
             device_time_ns: frame.device_time_ns,
+            time_ns: frame.device_time_ns,
             depth,
+            window,
             color: frame.color.clone(),
             model_from_camera: located.model_from_camera,
             tracked: located.tracked,
         }
+    }
+
+    /// Its surface elements, without colour.
+    pub(crate) fn view(&self) -> DepthView {
+        self.depth.view(self.window)
     }
 
     /// True where it has colours of what a camera at this pose sees.
@@ -64,9 +81,14 @@ impl Kept {
         self.frames.is_empty()
     }
 
-    /// Poses in the order of time.
-    pub(crate) fn poses(&self) -> Vec<Rigid> {
-        self.frames.iter().map(|k| k.model_from_camera).collect()
+    /// The frames of the leading sensor.
+    pub(crate) fn leading(&self) -> &[KeptFrame] {
+        self.groups().next().unwrap_or_default()
+    }
+
+    /// The frames of each sensor.
+    pub(crate) fn groups(&self) -> impl Iterator<Item = &[KeptFrame]> {
+        self.frames.chunk_by(|a, b| a.sensor == b.sensor)
     }
 
     /// True where any frame has colours.
@@ -101,8 +123,15 @@ impl Kept {
         median(&mut residuals).unwrap_or(f64::INFINITY)
     }
 
-    /// At most this many frames, evenly spaced from the first on.
+    /// At most this many frames (and one more for each further sensor), evenly spaced from each sensor's first on.
     pub(crate) fn key_frames(&self, most: usize) -> Vec<usize> {
-        (0..self.len()).step_by(self.len().div_ceil(most).max(1)).collect()
+        let step = self.len().div_ceil(most).max(1);
+        let mut first = 0;
+        let mut keys = Vec::new();
+        for group in self.groups() {
+            keys.extend((first..first + group.len()).step_by(step));
+            first += group.len();
+        }
+        keys
     }
 }

@@ -63,6 +63,13 @@ impl MotionModel {
         self.axis().map_or(pose, |axis| axis.turn(self.rate(&axis) * seconds(time_ns - then.time_ns)) * pose)
     }
 
+    /// Where a disk that has stopped or turned back since the last pose has brought the subject; nothing without an axis.
+    pub(crate) fn stopped_or_back(&self, time_ns: i64) -> Vec<Rigid> {
+        let Some((axis, last)) = self.axis().zip(self.poses.last()) else { return Vec::new() };
+        let turn = self.rate(&axis) * seconds(time_ns - last.time_ns);
+        [0.0, -0.5, -1.0, 0.5].map(|share| axis.turn(share * turn) * last.model_from_camera).to_vec()
+    }
+
     /// The axis over the recent poses, where there is a turntable and they turned far enough.
     pub(crate) fn axis(&self) -> Option<Axis> {
         if self.prior != Prior::Turntable {
@@ -89,7 +96,7 @@ fn turn_between(a: Option<&Rigid>, b: Option<&Rigid>) -> f64 {
 }
 
 /// A fraction (or multiple) of a rigid motion, rotation and translation apart.
-fn scaled(motion: &Rigid, ratio: f64) -> Rigid {
+pub(crate) fn scaled(motion: &Rigid, ratio: f64) -> Rigid {
     let rotation = Rotation3::new(motion.rotation.scaled_axis() * ratio);
     Isometry3::from_parts(
         Translation3::from(motion.translation.vector * ratio),
@@ -106,7 +113,7 @@ mod tests {
     use nalgebra::{Point3, Vector3};
 
     use super::*;
-    use crate::tracking::axis::total_turn;
+    use crate::tracking::axis::swept_turn;
 
     #[test]
     fn a_turn_about_a_tilted_axis_is_found_and_predicted() {
@@ -118,7 +125,7 @@ mod tests {
         assert!((found.direction + axis.direction).norm() < 1e-9, "{found:?}");
         let off = (found.point - axis.point).cross(&axis.direction).norm();
         assert!(off < 1e-9, "{off}");
-        assert!((total_turn(&found, &poses) - 29.0 * 0.06).abs() < 1e-9);
+        assert!((swept_turn(&found, &poses) - 29.0 * 0.06).abs() < 1e-9);
         let mut model = MotionModel::new(Prior::Turntable);
         (0..30).for_each(|k| model.push(TimedPose { time_ns: 200_000_000 * k as i64, model_from_camera: pose(k) }));
         let next = model.predict(200_000_000 * 31);

@@ -17,7 +17,7 @@ const THINNING: usize = 6;
 /// A step below this (metres at the subject's radius) asks for all points.
 const NEARLY: f64 = 2e-4;
 /// A step below this (metres at the subject's radius) has converged.
-const CONVERGED: f64 = 5e-6;
+pub(crate) const CONVERGED: f64 = 5e-6;
 /// Iterations of each stage at most.
 const ITERATIONS: usize = 15;
 /// Iterations in which the gate follows the data; then it stays, so that steps converge.
@@ -75,7 +75,7 @@ pub fn register(field: &Tsdf, points: &[Sample], start: &Rigid) -> Tracked {
 }
 
 /// The distance beyond which a sample does not count, metres.
-fn gate_of(field: &Tsdf, points: &[Sample], pose: &Rigid) -> f64 {
+pub(crate) fn gate_of(field: &Tsdf, points: &[Sample], pose: &Rigid) -> f64 {
     let truncation = f64::from(field.truncation());
     let spread = robust_spread(field, points, pose).unwrap_or(truncation / 3.0);
     (TUKEY * spread).clamp(SMALLEST_GATE, truncation * 0.9)

@@ -153,6 +153,9 @@ impl Tracker {
             let tracked = clock.time("search", || place_view(past, view, &other.model_from_camera))?;
             return Ok(self.found(tracked));
         }
+        if let Some(tracked) = self.stopped_or_back(frame, view, past, clock) {
+            return Ok(self.found(tracked));
+        }
         let axis = self.motion.axis();
         // Without an axis there is nothing to search about.
         if self.lost.frames <= PATIENCE || axis.is_none() {
@@ -168,6 +171,24 @@ impl Tracker {
         }
         self.lost.frames += 1;
         Err(if self.lost.candidate.is_some() { DropReason::Unconfirmed } else { reason })
+    }
+
+    /// The pose of a frame whose disk has stopped or turned back since the last one, where it can be trusted.
+    fn stopped_or_back(
+        &self,
+        frame: &Frame,
+        view: &DepthView,
+        past: Past<'_>,
+        clock: &mut Stopwatch,
+    ) -> Option<Tracked> {
+        if self.lost.frames > 0 {
+            return None;
+        }
+        self.motion.stopped_or_back(frame.device_time_ns).into_iter().find_map(|start| {
+            let tracked = clock.time("turned back", || track(past.field, view, &start));
+            let usual = tracked.residual < CANDIDATE * past.kept.usual_residual();
+            (usual && trusted(view, &tracked, past.field.truncation(), Some(&start)).is_ok()).then_some(tracked)
+        })
     }
 
     /// Searches the next turns about the axis for a candidate.

@@ -1,5 +1,7 @@
 //! The commands, a file each: its options, its calls, its answer.
 
+pub mod calibrate;
+mod calibrate_board;
 pub mod capture;
 pub mod completions;
 pub mod demo;

@@ -13,7 +13,7 @@ use toile_character::BodyModel;
 use toile_fitting::measure_table;
 use toile_pipeline::Observer;
 use toile_synthetic::{
-    GarmentKind, GarmentSettings, SensorPreset, Sex, Subject, SyntheticError, SyntheticSettings,
+    GarmentKind, GarmentSettings, Motion, RigSettings, SensorPreset, Sex, Subject, SyntheticError, SyntheticSettings,
     folder::write_subject_folder, record::record_subject,
 };
 
@@ -26,7 +26,9 @@ written beside: under OUT/truth for a subject, in each folder's truth/ otherwise
 
 Examples:
   toile synthesize --out olga --seed 7 --garments trousers,tshirt,jacket
-  toile synthesize --out olga-folders --as folders --sensor kinect1 --sway 0.8";
+  toile synthesize --out olga-folders --as folders --sensor kinect1 --sway 0.8
+  toile synthesize --out rig --sensors 3 --rig-error 20 --garments \"\"
+  toile synthesize --out fixed --sensors 4 --motion still --frames 3 --fps 30";
 
 /// Make a synthetic subject with its truth: for training, tests and trials of a rig
 #[derive(Debug, clap::Args)]
@@ -71,6 +73,14 @@ pub struct Synthesize {
     /// Depth as the geometry is, without the sensor's noise
     #[arg(long)]
     clean: bool,
+    /// How the disk moves: turn, uneven, stop, twice, back-and-forth (each way --degrees), still
+    #[arg(long, default_value = Motion::default().name())]
+    motion: String,
+    /// How far the disk's axis leans, degrees
+    #[arg(long, default_value_t = 0.0)]
+    tilt: f64,
+    #[command(flatten)]
+    rig: RigArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
@@ -83,6 +93,47 @@ enum Kind {
 enum SexChoice {
     Female,
     Male,
+}
+
+/// Several sensors around the disk.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Rigs")]
+struct RigArgs {
+    /// Sensors, evenly around the disk, each with a clock of its own
+    #[arg(long, default_value_t = RigSettings::default().sensors, value_name = "N")]
+    sensors: usize,
+    /// How wrong the recorded places of the sensors are at most, millimetres
+    #[arg(long, default_value_t = 1e3 * RigSettings::default().error_m, value_name = "MM")]
+    rig_error: f64,
+    /// How wrong their recorded rotations are at most, degrees
+    #[arg(long, default_value_t = RigSettings::default().error_degrees, value_name = "DEGREES")]
+    rig_turn_error: f64,
+    /// How fast the clock of every second sensor runs away, parts in a million
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_name = "PPM")]
+    clock_drift: f64,
+    /// Push the last sensor aside by this in the middle of each take, millimetres
+    #[arg(long, default_value_t = 0.0, value_name = "MM")]
+    knock: f64,
+    /// Share of the depth that sensors lose to each other's light, percent
+    #[arg(long, default_value_t = 0.0, value_name = "PERCENT")]
+    interference: f64,
+    /// How far the sensors shake, degrees
+    #[arg(long, default_value_t = 0.0, value_name = "DEGREES")]
+    shake: f64,
+}
+
+impl RigArgs {
+    fn settings(&self) -> RigSettings {
+        RigSettings {
+            sensors: self.sensors,
+            error_m: 1e-3 * self.rig_error,
+            error_degrees: self.rig_turn_error,
+            clock_drift_ppm: self.clock_drift,
+            knock_m: 1e-3 * self.knock,
+            interference: 1e-2 * self.interference,
+            shake_degrees: self.shake,
+        }
+    }
 }
 
 impl Synthesize {
@@ -168,6 +219,10 @@ impl Synthesize {
         let sensor = SensorPreset::from_name(&self.sensor).ok_or_else(|| {
             StudioError::Usage(format!("--sensor: there is no `{}`; choose of {sensors}", self.sensor))
         })?;
+        let motion = Motion::from_name(&self.motion).ok_or_else(|| {
+            let motions = Motion::ALL.map(Motion::name).join(", ");
+            StudioError::Usage(format!("--motion: there is no `{}`; choose of {motions}", self.motion))
+        })?;
         let name = self.out.file_name().map_or("subject".into(), |n| n.to_string_lossy().into_owned());
         let sex = match self.sex {
             SexChoice::Female => Sex::Female,
@@ -182,6 +237,9 @@ impl Synthesize {
             frames: self.frames,
             degrees: self.degrees,
             fps: self.fps,
+            motion,
+            tilt_degrees: self.tilt,
+            rig: self.rig.settings(),
             sway_degrees: self.sway,
             breathing_m: 1e-3 * self.breathing,
             distance_m: self.distance,

@@ -22,6 +22,7 @@ const TABLE: &[Row] = &[
     row("capture", &["geometry", "scans"], &["outside"]),
     row("fusion", &["geometry", "capture"], &[]),
     row("stereo", &["geometry", "capture"], &["outside"]),
+    row("calibration", &["geometry"], &["outside"]),
     row("character", &["geometry"], &["outside"]),
     row("fitting", &["geometry", "character"], &["outside", "synthetic"]),
     row("garments", &["geometry", "character"], &["animation", "outside", "synthetic"]),

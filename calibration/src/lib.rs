@@ -1,0 +1,38 @@
+//! Cameras from pictures of a chessboard: intrinsics, lens distortion, and where each camera of a rig stands.
+//!
+//! - [`find_corners`]: the inner corners of a board in a picture, below a tenth of a pixel;
+//! - [`calibrate`]: intrinsics of each camera (or those that are told), places of all cameras, from pictures in which
+//!   several cameras see the board at rest.
+//!
+//! Inside: `saddle` finds corners (crossings of edges), `grid` puts them in rows and columns; `homography` and `closed_form`
+//! give first values (Zhang 2000, "A flexible new technique for camera calibration"), `bundle` refines everything together.
+//!
+//! ```
+//! use toile_calibration::{Board, Grey, find_corners};
+//! let board = Board { columns: 9, rows: 6, square_m: 0.025 };
+//! let empty = Grey::new(64, 48, vec![128.0; 64 * 48]);
+//! assert!(find_corners(&empty, &board).is_none());
+//! ```
+
+mod board;
+mod bundle;
+mod closed_form;
+mod error;
+mod grey;
+mod grid;
+mod homography;
+mod moments;
+mod rig;
+mod saddle;
+
+#[cfg(test)]
+mod picture;
+#[cfg(test)]
+mod tests;
+
+pub use board::Board;
+pub use error::CalibrationError;
+pub use grey::Grey;
+pub use grid::find_corners;
+pub use moments::{Sighting, views_of};
+pub use rig::{CalibratedRig, View, calibrate};
