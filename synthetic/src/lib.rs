@@ -14,12 +14,15 @@
 //! the disk and equals the room's at the first frame.
 
 mod cut;
+mod dirt;
 pub mod dressing;
 mod error;
 mod field;
 pub mod folder;
 mod garment;
+mod lens;
 mod noise;
+mod nuisances;
 mod pattern;
 mod person;
 mod posture;
@@ -43,6 +46,7 @@ mod view;
 
 pub use error::SyntheticError;
 pub use garment::Garment;
+pub use nuisances::Nuisances;
 pub use person::Person;
 pub use sensor::SensorPreset;
 pub use settings::{GarmentKind, GarmentSettings, Pattern, Sex, SyntheticSettings};

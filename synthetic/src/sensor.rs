@@ -94,16 +94,16 @@ pub struct NoiseSeed {
 }
 
 impl NoiseSeed {
-    fn uniform(&self, pixel: usize, channel: u64) -> f64 {
+    pub(crate) fn uniform(&self, pixel: usize, channel: u64) -> f64 {
         uniform_at(self.seed ^ channel, self.frame, pixel as u64)
     }
 
-    fn normal(&self, pixel: usize, channel: u64) -> f64 {
+    pub(crate) fn normal(&self, pixel: usize, channel: u64) -> f64 {
         normal_at(self.seed ^ channel, self.frame, pixel as u64)
     }
 
     /// Noise in lumps of `size` pixels with standard deviation of about 1.
-    fn lumpy(&self, u: usize, v: usize, size: f64, channel: u64) -> f64 {
+    pub(crate) fn lumpy(&self, u: usize, v: usize, size: f64, channel: u64) -> f64 {
         /// Standard deviation of a bilinear blend of normal numbers, averaged over its cell.
         const BLEND: f64 = 0.667;
         let (x, y) = (u as f64 / size, v as f64 / size);

@@ -9,7 +9,9 @@ use toile_geometry::{Mesh, Rigid, camera::PinholeCamera};
 
 use crate::{
     SyntheticError,
+    dirt::{Stage, spoil_depth, spoil_light, whiten_dark_cloth},
     dressing::dress,
+    lens::{Picture, smear, through_lens},
     posture::pose_of_take,
     random::Random,
     sensor::{self, DEPTH_SCALE, NoiseSeed, TrueImage},
@@ -22,6 +24,8 @@ use crate::{
 
 /// Host time minus device time of the virtual device, nanoseconds.
 const LATENCY_NS: i64 = 8_000_000;
+/// Moments of an exposure that a smeared picture is made of.
+const SMEARED: usize = 5;
 
 /// One take of a subject.
 #[derive(Debug, Clone)]
@@ -99,6 +103,11 @@ impl Take {
         self.settings.sensor.camera()
     }
 
+    /// The camera as the recording's calibration tells it: with its lens, unless that is kept from it.
+    pub fn told_camera(&self) -> PinholeCamera {
+        self.settings.nuisances.told(&self.camera())
+    }
+
     /// The virtual rig: one sensor, colour registered to depth.
     pub fn rig(&self) -> Rig {
         let preset = self.settings.sensor;
@@ -111,9 +120,9 @@ impl Take {
         let sensor = Sensor {
             name: "camera".into(),
             identity,
-            depth: self.camera(),
+            depth: self.told_camera(),
             depth_scale: DEPTH_SCALE,
-            color: Some(self.camera()),
+            color: Some(self.told_camera()),
             color_from_depth: Rigid::identity(),
             rig_from_depth: Rigid::identity(),
             fps: self.settings.fps,
@@ -138,10 +147,52 @@ impl Take {
 
     /// The picture of frame `index` through another lens in the camera's place.
     pub fn look_through(&self, lens: &PinholeCamera, index: usize) -> (TrueImage, Vec<[u8; 3]>) {
-        let moment = &self.moments[index];
+        self.look_at(lens, index, &self.moments[index])
+    }
+
+    /// The picture of frame `index` if it were taken at another moment.
+    fn look_at(&self, lens: &PinholeCamera, index: usize, moment: &Moment) -> Picture {
         let bent = self.bend.apply(&self.surface.mesh.positions, moment);
         let from = Viewpoint { room_from_camera: self.room_from_camera, angle: moment.angle, frame: index };
         self.scene.look(&self.surface.mesh, bent, lens, &from)
+    }
+
+    /// Depth (units of [`DEPTH_SCALE`]) and colours of frame `index`, with everything that spoils them.
+    fn measured(&self, index: usize) -> (Vec<u16>, Vec<[u8; 3]>) {
+        let nuisances = &self.settings.nuisances;
+        let noise = NoiseSeed { seed: self.noise_seed, frame: index as u64 };
+        let (mut truth, pixels) = if nuisances.are_none() { self.look(index) } else { self.spoilt(index, noise) };
+        let dark = if nuisances.has_dark_cloth { whiten_dark_cloth(&mut truth) } else { Vec::new() };
+        let mut values = if self.settings.noise {
+            sensor::measure(self.settings.sensor, &truth, noise)
+        } else {
+            sensor::exact(&truth)
+        };
+        if !nuisances.are_none() {
+            spoil_depth(nuisances, noise, self.camera().width as usize, (&truth, &dark), &mut values);
+        }
+        (values, pixels)
+    }
+
+    /// The picture of frame `index` with everything that spoils it before it is measured.
+    fn spoilt(&self, index: usize, noise: NoiseSeed) -> Picture {
+        let (nuisances, camera) = (&self.settings.nuisances, self.camera());
+        let smear_rad = nuisances.smear_degrees.to_radians();
+        let mut picture = if smear_rad > 0.0 {
+            let at = |k: usize| {
+                let part = k as f64 / (SMEARED - 1) as f64 - 0.5;
+                let moment = Moment { angle: self.moments[index].angle + part * smear_rad, ..self.moments[index] };
+                self.look_at(&camera, index, &moment)
+            };
+            smear((0..SMEARED).map(at).collect())
+        } else {
+            self.look(index)
+        };
+        let top = self.surface.mesh.positions.iter().map(|p| f64::from(p.y)).fold(0.0, f64::max);
+        let stage = Stage { camera: &camera, room_from_camera: &self.room_from_camera, top, noise };
+        spoil_light(nuisances, &stage, &mut picture.0);
+        let bent = nuisances.bent(&camera);
+        if bent.is_distorted() { through_lens(&picture, &bent) } else { picture }
     }
 
     /// Frame `index` as the virtual device gives it.
@@ -149,14 +200,8 @@ impl Take {
     /// # Errors
     /// [`SyntheticError::Encode`] where the colour cannot be encoded.
     pub fn frame(&self, index: usize) -> Result<Frame, SyntheticError> {
-        let (truth, pixels) = self.look(index);
+        let (values, pixels) = self.measured(index);
         let lens = self.camera();
-        let noise = NoiseSeed { seed: self.noise_seed, frame: index as u64 };
-        let values = if self.settings.noise {
-            sensor::measure(self.settings.sensor, &truth, noise)
-        } else {
-            sensor::exact(&truth)
-        };
         let color = RgbImage { width: lens.width, height: lens.height, pixels };
         let jpeg = encode_jpeg(&color, self.settings.jpeg_quality)
             .map_err(|reason| SyntheticError::Encode { index, reason })?;
