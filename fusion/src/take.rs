@@ -9,3 +9,4 @@ mod preparer;
 pub use fuse::{fuse, survey};
 pub use fuser::{Fuser, Outcome};
 pub use live::LiveFuser;
+pub(crate) use model::NOISE_BAND;
