@@ -1,7 +1,7 @@
 //! Fuses a folder of frames and writes scan.ply, trajectory.tum, report.json and timings.json, for measuring.
 //!
 //! `cargo run --release -p toile-fusion --example fuse_folder -- FOLDER OUT [key=value ...]` with keys voxel, trunc,
-//! volume=all, prior=none, poses=TUM, triangles, closing, refine, fill=0, smooth, every.
+//! volume=all, prior=none, poses=TUM, triangles, closing, refine, fill=0, smooth, height, every.
 
 use std::{error::Error, fs, path::Path};
 
@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             "refine" => settings.refine_rounds = value.parse()?,
             "fill" => settings.fill_holes = value != "0",
             "smooth" => settings.smoothing_passes = value.parse()?,
+            "height" => settings.known_height = value.parse()?,
             "every" => every = value.parse()?,
             _ => return Err(format!("unknown option {key}").into()),
         }

@@ -3,8 +3,12 @@
 mod clean_up;
 mod closing;
 mod fuse_again;
+mod noise;
+mod noisy;
 mod placing;
 mod poses;
+mod residuals;
+mod scale;
 mod summary;
 mod whole;
 

@@ -196,3 +196,45 @@ fn places_too_far_for_their_digits_are_refused_or_fused_but_never_a_panic() {
         drop(integrate(&mut field, &view, &far));
     }
 }
+
+/// Noise of 12 mm in blotches, with a band that suits 7: what is cut of it on one side alone makes the subject thin.
+#[test]
+fn noise_that_is_wide_against_the_band_neither_thins_the_subject_nor_stays_unsaid() {
+    let scene = Scene { blotches: 0.021, ..Scene::new() };
+    let scan = fuse(&mut scene.source(&steps(60, 6.0)), &settings(), &|_| {}).unwrap();
+    let report = &scan.report;
+    assert!((5.0..20.0).contains(&report.noise_widest_mm), "{}", report.noise_widest_mm);
+    assert!(report.noise_correlation.abs() < 0.3, "{}", report.noise_correlation);
+    assert!(report.warnings.iter().any(|w| w.contains("depth is noisy")), "{:?}", report.warnings);
+    let figure_from_scan = scene.figure_from_camera(0.0) * scan.trajectory[0].scan_from_camera.inverse();
+    let seen = scan.mesh.positions.iter().zip(&scan.mesh.attributes["filled"]).filter(|(_, filled)| **filled == 0.0);
+    let mut off: Vec<f64> = seen.map(|(p, _)| figure_distance(&(figure_from_scan * p.cast::<f64>()))).collect();
+    let bias = toile_geometry::statistics::median(&mut off).unwrap();
+    assert!(bias.abs() < 0.0018, "{bias} m");
+}
+
+#[test]
+fn a_known_height_sets_the_scale_and_one_of_something_else_does_not() {
+    let scene = Scene::new();
+    let mut rig = scene.rig();
+    rig.sensors[0].depth_scale *= 1.01;
+    let frames = scene.frames(&steps(12, 30.0));
+    let with = |known_height: f64| {
+        let mut source = Memory { rig: rig.clone(), frames: frames.clone(), next: 0 };
+        fuse(&mut source, &FusionSettings { known_height, ..settings() }, &|_| {}).unwrap()
+    };
+    let (told, foreign, untold) = (with(1.705), with(1.2), with(0.0));
+    let height = |scan: &crate::Scan| scan.mesh.positions.iter().map(|p| p.y).fold(0.0, f32::max);
+    assert!((height(&told) - 1.705).abs() < 1e-4, "{}", height(&told));
+    assert!((told.report.scaled_by * f64::from(height(&untold)) - 1.705).abs() < 1e-4, "{}", told.report.scaled_by);
+    assert!((0.985..0.999).contains(&told.report.scaled_by), "{}", told.report.scaled_by);
+    assert!(told.report.warnings.iter().any(|w| w.contains("too long")), "{:?}", told.report.warnings);
+    let reach = |scan: &crate::Scan| scan.trajectory[3].scan_from_camera.translation.vector.norm();
+    assert!((reach(&told) / reach(&untold) - told.report.scaled_by).abs() < 1e-9);
+    assert!(
+        foreign.report.warnings.iter().any(|w| w.contains("not of the same thing")),
+        "{:?}",
+        foreign.report.warnings
+    );
+    assert_eq!((foreign.report.scaled_by, height(&foreign)), (1.0, height(&untold)));
+}

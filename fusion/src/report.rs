@@ -28,6 +28,9 @@ pub struct VolumeReport {
     pub axis_distance_m: f64,
     /// The side of the image that is up.
     pub image_up: ImageSide,
+    /// How far a bent lens that the calibration does not have would bend the floor as it is seen, root mean square,
+    /// millimetres; absent without a floor.
+    pub floor_bend_mm: Option<f64>,
 }
 
 /// A camera that was moved within a take.
@@ -101,6 +104,13 @@ pub struct FusionReport {
     pub volume: Option<VolumeReport>,
     /// Standard deviation of the depth noise, measured on the subject, millimetres.
     pub noise_mm: f64,
+    /// Standard deviation of the noise along the surface's normals, measured against the whole, millimetres; 0 where it was
+    /// not measured.
+    pub noise_whole_mm: f64,
+    /// That of the noisiest twentieth of the surface.
+    pub noise_widest_mm: f64,
+    /// Correlation of the noise of pixels four apart, 0 (independent) to 1 (blotches).
+    pub noise_correlation: f64,
     /// Truncation used: as set, or more where the noise asks for it, millimetres.
     pub truncation_mm: f64,
     /// Root mean square tracking residual, median over frames, millimetres.
@@ -119,6 +129,10 @@ pub struct FusionReport {
     pub seam_before_mm: f64,
     /// The same after closing.
     pub seam_after_mm: f64,
+    /// Height of the scan's highest point over its zero, metres.
+    pub height_m: f64,
+    /// What the scan was multiplied by so that its height is the known one; 1 where none is known or they do not fit.
+    pub scaled_by: f64,
     /// Triangles before clean-up.
     pub triangles_raw: usize,
     /// Triangles of the scan.

@@ -68,6 +68,9 @@ pub struct FusionSettings {
     pub fill_holes: bool,
     /// Passes of non-shrinking smoothing. Default 5.
     pub smoothing_passes: usize,
+    /// Height of the subject's highest point, as it stands there, over what it stands on, metres; 0 (default): not known.
+    /// The scan is scaled to it, so that a sensor whose depth is a few thousandths too long or short is set right.
+    pub known_height: f64,
 }
 
 impl Default for FusionSettings {
@@ -85,6 +88,7 @@ impl Default for FusionSettings {
             target_triangles: 80_000,
             fill_holes: true,
             smoothing_passes: 5,
+            known_height: 0.0,
         }
     }
 }
@@ -100,6 +104,11 @@ impl FusionSettings {
         }
         if !(self.truncation >= 2.0 * self.voxel_size && self.truncation < 1.0) {
             return Err(FusionError::Settings("truncation must be at least two voxels and less than 1 m".into()));
+        }
+        if !(self.known_height == 0.0 || (0.1..=3.0).contains(&self.known_height)) {
+            return Err(FusionError::Settings(
+                "known_height must be between 0.1 and 3 m, or 0 where it is not known".into(),
+            ));
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Where the subject is: what moves before what rests.
 
 mod background;
+mod bend;
 mod cut;
 mod floor;
 mod upright;

@@ -15,4 +15,5 @@ pub(crate) use waiting::{Waiting, spread};
 pub use fuse::fuse;
 pub use fuser::{Fuser, Outcome};
 pub use live::LiveFuser;
+pub(crate) use model::NOISE_BAND;
 pub use survey::survey;

@@ -58,6 +58,8 @@ pub(crate) struct Scene {
     pub with_wall: bool,
     /// Half width of uniform depth noise, metres.
     pub noise: f64,
+    /// Half width of uniform noise that blocks of four pixels square share, metres.
+    pub blotches: f64,
 }
 
 impl Scene {
@@ -72,6 +74,7 @@ impl Scene {
             with_floor: true,
             with_wall: true,
             noise: 0.002,
+            blotches: 0.0,
         }
     }
 
@@ -88,7 +91,9 @@ impl Scene {
                 return 0;
             }
             let noise = self.noise * (hash(seed << 32 | u64::from(i)) * 2.0 - 1.0);
-            ((depth + noise) * 1000.0).round() as u16
+            let block = u64::from(((i / w / 4) << 16) | (i % w / 4));
+            let blotch = self.blotches * (hash(!seed << 32 | block) * 2.0 - 1.0);
+            ((depth + noise + blotch) * 1000.0).round() as u16
         };
         DepthImage { width: w, height: h, values: (0..w * h).into_par_iter().map(pixel).collect() }
     }

@@ -71,7 +71,7 @@ fn encode_depth(depth: &DepthImage) -> Result<Vec<u8>, image::ImageError> {
 }
 
 fn camera_json(take: &Take, settings: &SyntheticSettings) -> String {
-    let c = take.camera();
+    let c = take.told_camera();
     let value = json!({
         "width": c.width,
         "height": c.height,

@@ -14,14 +14,17 @@
 //! the disk and equals the room's at the first frame.
 
 mod cut;
+mod dirt;
 pub mod dressing;
 mod error;
 mod field;
 pub mod folder;
 mod garment;
 mod interference;
+mod lens;
 mod motion;
 mod noise;
+mod nuisances;
 mod pattern;
 mod person;
 mod posture;
@@ -48,6 +51,7 @@ mod view;
 pub use error::SyntheticError;
 pub use garment::Garment;
 pub use motion::Motion;
+pub use nuisances::Nuisances;
 pub use person::Person;
 pub use rig_settings::{MAX_SENSORS, RigSettings};
 pub use sensor::SensorPreset;

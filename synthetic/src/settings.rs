@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     SyntheticError,
     motion::Motion,
+    nuisances::Nuisances,
     rig_settings::{MAX_SENSORS, RigSettings},
     sensor::SensorPreset,
 };
@@ -168,6 +169,9 @@ pub struct SyntheticSettings {
     pub noise: bool,
     /// JPEG quality of the colour frames, 1..100, default 85.
     pub jpeg_quality: u8,
+    /// What spoils depth beside the sensor's own noise, default nothing.
+    #[serde(skip_serializing_if = "Nuisances::are_none")]
+    pub nuisances: Nuisances,
 }
 
 impl Default for SyntheticSettings {
@@ -195,6 +199,7 @@ impl Default for SyntheticSettings {
             room: true,
             noise: true,
             jpeg_quality: 85,
+            nuisances: Nuisances::default(),
         }
     }
 }
@@ -231,7 +236,8 @@ impl SyntheticSettings {
         within("sway_degrees", self.sway_degrees, 0.0, 5.0)?;
         within("breathing_m", self.breathing_m, 0.0, 0.02)?;
         within("joint_jitter_degrees", self.joint_jitter_degrees, 0.0, 10.0)?;
-        within("jpeg_quality", f64::from(self.jpeg_quality), 1.0, 100.0)
+        within("jpeg_quality", f64::from(self.jpeg_quality), 1.0, 100.0)?;
+        self.nuisances.validate()
     }
 
     /// Folder name of take `n`: `00-body`, `01-trousers`, ...

@@ -10,8 +10,10 @@ use toile_geometry::{Mesh, Rigid, camera::PinholeCamera};
 
 use crate::{
     SyntheticError,
+    dirt::{Stage, spoil_depth, spoil_light, whiten_dark_cloth},
     dressing::dress,
     interference::disturb,
+    lens::{Picture, smear, through_lens},
     posture::pose_of_take,
     random::Random,
     rig::{Stand, knock, leaning, rig_json, stands},
@@ -22,6 +24,9 @@ use crate::{
     turntable::{Bend, Moment, moments},
     view::{Scene, Viewpoint},
 };
+
+/// Moments of an exposure that a smeared picture is made of.
+const SMEARED: usize = 5;
 
 /// One take of a subject.
 #[derive(Debug, Clone)]
@@ -106,6 +111,11 @@ impl Take {
         self.settings.sensor.camera()
     }
 
+    /// The camera as the recording's calibration tells it: with its lens, unless that is kept from it.
+    pub fn told_camera(&self) -> PinholeCamera {
+        self.settings.nuisances.told(&self.camera())
+    }
+
     /// The virtual rig as the recording has it: colour registered to depth; the sensors' places with their error.
     pub fn rig(&self) -> Rig {
         let preset = self.settings.sensor;
@@ -117,9 +127,9 @@ impl Take {
                 firmware: env!("CARGO_PKG_VERSION").into(),
                 ..DeviceIdentity::default()
             },
-            depth: self.camera(),
+            depth: self.told_camera(),
             depth_scale: DEPTH_SCALE,
-            color: Some(self.camera()),
+            color: Some(self.told_camera()),
             color_from_depth: Rigid::identity(),
             rig_from_depth: stand.recorded,
             fps: self.settings.fps,
@@ -162,10 +172,56 @@ impl Take {
 
     /// The picture of frame `index` through another lens in the camera's place.
     pub fn look_through(&self, lens: &PinholeCamera, index: usize) -> (TrueImage, Vec<[u8; 3]>) {
-        let moment = &self.moments[index];
+        self.look_at(lens, index, &self.moments[index])
+    }
+
+    /// The picture of frame `index` if it were taken at another moment.
+    fn look_at(&self, lens: &PinholeCamera, index: usize, moment: &Moment) -> Picture {
         let bent = self.bend.apply(&self.surface.mesh.positions, moment);
         let from = Viewpoint { room_from_camera: self.room_from_sensor(index), angle: moment.angle, frame: index };
         self.scene.look(&self.surface.mesh, bent, lens, &from)
+    }
+
+    /// Depth (units of [`DEPTH_SCALE`]) and colours of frame `index`, with everything that spoils them.
+    fn measured(&self, index: usize) -> (Vec<u16>, Vec<[u8; 3]>) {
+        let nuisances = &self.settings.nuisances;
+        let noise = NoiseSeed { seed: self.noise_seed, frame: index as u64 };
+        let (mut truth, pixels) = if nuisances.are_none() { self.look(index) } else { self.spoilt(index, noise) };
+        let dark = if nuisances.has_dark_cloth { whiten_dark_cloth(&mut truth) } else { Vec::new() };
+        let mut values = if self.settings.noise {
+            sensor::measure(self.settings.sensor, &truth, noise)
+        } else {
+            sensor::exact(&truth)
+        };
+        if !nuisances.are_none() {
+            spoil_depth(nuisances, noise, self.camera().width as usize, (&truth, &dark), &mut values);
+        }
+        if self.stands.len() > 1 {
+            let lens = self.camera();
+            disturb(&mut values, (lens.width, lens.height), self.settings.rig.interference, noise);
+        }
+        (values, pixels)
+    }
+
+    /// The picture of frame `index` with everything that spoils it before it is measured.
+    fn spoilt(&self, index: usize, noise: NoiseSeed) -> Picture {
+        let (nuisances, camera) = (&self.settings.nuisances, self.camera());
+        let smear_rad = nuisances.smear_degrees.to_radians();
+        let mut picture = if smear_rad > 0.0 {
+            let at = |k: usize| {
+                let part = k as f64 / (SMEARED - 1) as f64 - 0.5;
+                let moment = Moment { angle: self.moments[index].angle + part * smear_rad, ..self.moments[index] };
+                self.look_at(&camera, index, &moment)
+            };
+            smear((0..SMEARED).map(at).collect())
+        } else {
+            self.look(index)
+        };
+        let top = self.surface.mesh.positions.iter().map(|p| f64::from(p.y)).fold(0.0, f64::max);
+        let stage = Stage { camera: &camera, room_from_camera: &self.room_from_sensor(index), top, noise };
+        spoil_light(nuisances, &stage, &mut picture.0);
+        let bent = nuisances.bent(&camera);
+        if bent.is_distorted() { through_lens(&picture, &bent) } else { picture }
     }
 
     /// Frame `index` as the virtual device gives it.
@@ -173,17 +229,8 @@ impl Take {
     /// # Errors
     /// [`SyntheticError::Encode`] where the colour cannot be encoded.
     pub fn frame(&self, index: usize) -> Result<Frame, SyntheticError> {
-        let (truth, pixels) = self.look(index);
+        let (values, pixels) = self.measured(index);
         let lens = self.camera();
-        let noise = NoiseSeed { seed: self.noise_seed, frame: index as u64 };
-        let mut values = if self.settings.noise {
-            sensor::measure(self.settings.sensor, &truth, noise)
-        } else {
-            sensor::exact(&truth)
-        };
-        if self.stands.len() > 1 {
-            disturb(&mut values, (lens.width, lens.height), self.settings.rig.interference, noise);
-        }
         let color = RgbImage { width: lens.width, height: lens.height, pixels };
         let jpeg = encode_jpeg(&color, self.settings.jpeg_quality)
             .map_err(|reason| SyntheticError::Encode { index, reason })?;

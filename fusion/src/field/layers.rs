@@ -57,6 +57,8 @@ pub(crate) struct Layers<'a, L: Lanes> {
     truncation: [L::F; 2],
     far: L::F,
     nearest: L::F,
+    /// Weight units that fall with the incidence angle, and those that do not.
+    weights: [L::F; 2],
     /// Units of the field a metre; how far from the surface colour is taken, units, and its opposite.
     scale: L::F,
     color_band: [L::F; 2],
@@ -121,6 +123,7 @@ impl<'a, L: Lanes> Layers<'a, L> {
             truncation: [l.splat(p.truncation), l.splat(-p.truncation)],
             far: l.splat(4.0 * p.truncation),
             nearest: l.splat(p.nearest),
+            weights: if p.is_even { [l.splat(0.0), l.splat(WEIGHT_ONE)] } else { [l.splat(WEIGHT_ONE), l.splat(0.0)] },
             scale: l.splat(1.0 / p.unit),
             color_band: [l.splat(color_band), l.splat(-color_band)],
         }
@@ -250,7 +253,9 @@ impl<'a, L: Lanes> Layers<'a, L> {
         let distance = l.select(l.ge(ahead, self.far), t, l.max(l.min(to_plane, t), minus_t));
         let counts = l.and(l.ge(ahead, minus_t), l.ge(depth, self.nearest));
         let root = l.mul(slant, seen.inverse);
-        let weight = l.mul(l.mul(root, root), l.splat(WEIGHT_ONE));
+        let [slanted, even] = self.weights;
+        let near = l.mul(seen.inverse, seen.inverse);
+        let weight = l.add(l.mul(l.mul(root, root), slanted), l.mul(near, even));
         let weight = l.min(l.max(weight, l.splat(1.0)), l.splat(4.0 * WEIGHT_ONE));
         Measured { distance: l.mul(distance, self.scale), weight: l.keep(counts, weight), counts }
     }

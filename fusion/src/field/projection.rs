@@ -21,6 +21,8 @@ pub(crate) struct Projection<'a> {
     pub pitch: [f32; 2],
     /// Elements nearer than this are not fused, so that no voxel of a touched block lies beside or behind the camera.
     pub nearest: f32,
+    /// Weights do not fall with the incidence angle.
+    pub is_even: bool,
     /// The field's: metres, and metres a unit of its distances.
     pub truncation: f32,
     pub voxel_size: f32,
@@ -45,6 +47,7 @@ impl<'a> Projection<'a> {
             center: [camera.cx as f32, camera.cy as f32],
             pitch: [1.0 / camera.fx as f32, 1.0 / camera.fy as f32],
             nearest: NEAREST + tsdf.truncation() + 2.0 * SIDE as f32 * voxel,
+            is_even: tsdf.is_even(),
             truncation: tsdf.truncation(),
             voxel_size: voxel,
             unit: tsdf.unit(),

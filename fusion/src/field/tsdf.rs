@@ -18,6 +18,7 @@ pub struct Tsdf {
     pub(crate) blocks: Vec<Block>,
     pub(crate) colors: Vec<ColorBlock>,
     with_color: bool,
+    is_even: bool,
 }
 
 impl Tsdf {
@@ -31,7 +32,19 @@ impl Tsdf {
             blocks: Vec::new(),
             colors: Vec::new(),
             with_color,
+            is_even: false,
         }
+    }
+
+    /// Weighs measurements alike at all incidence angles, for noise that is the same along rays of all angles: along the
+    /// normal it is then the smaller, the more slanted a surface is seen.
+    pub(crate) fn weighed_evenly(self) -> Self {
+        Self { is_even: true, ..self }
+    }
+
+    /// True where weights do not fall with the incidence angle.
+    pub(crate) fn is_even(&self) -> bool {
+        self.is_even
     }
 
     /// Edge of a voxel, metres.

@@ -11,10 +11,8 @@ use crate::{
     tracking::KeptFrame,
 };
 
-/// Frames whose colours are used at most.
-const MAX_COLORED: usize = 200;
 /// Frames that are prepared together.
-const GROUP: usize = 16;
+pub(crate) const GROUP: usize = 16;
 
 /// The field of the scan: of all frames, with the colours of key frames. Where poses are as they were pushed and
 /// there are no colours, that is the model already.
@@ -42,7 +40,7 @@ pub(crate) fn final_field(fuser: &mut Fuser) -> Result<Tsdf, FusionError> {
 pub(crate) fn fuse_again(fuser: &mut Fuser, frames: &[usize], with_color: bool) -> Result<Tsdf, FusionError> {
     let with_color = with_color && fuser.kept.has_color();
     let mut field = fuser.model.empty_field(with_color);
-    let colored = fuser.kept.len().div_ceil(MAX_COLORED).max(1);
+    let colored = fuser.kept.colored_step();
     let (kept, sensors, clock) = (&fuser.kept.frames, &fuser.sensors, &mut fuser.clock);
     let step = if with_color { "integrate with colour" } else { "integrate again" };
     for group in frames.chunks(GROUP) {
@@ -56,7 +54,7 @@ pub(crate) fn fuse_again(fuser: &mut Fuser, frames: &[usize], with_color: bool) 
     Ok(field)
 }
 
-fn colored_view(kept: &KeptFrame, sensor: &Sensor, with_color: bool) -> DepthView {
+pub(crate) fn colored_view(kept: &KeptFrame, sensor: &Sensor, with_color: bool) -> DepthView {
     let mut view = kept.view();
     if let Some(image) = decode_color(kept.color.as_ref(), kept.index).filter(|_| with_color) {
         view.add_colors(&image, sensor);

@@ -4,9 +4,14 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 use toile_geometry::Rigid;
 
-use super::{closing::close, fuse_again::fuse_again};
+use super::{
+    closing::close,
+    fuse_again::fuse_again,
+    residuals::{residuals, settle},
+};
 use crate::{
     FusionError,
+    field::Tsdf,
     frame::DepthView,
     report::FusionReport,
     take::Fuser,
@@ -20,15 +25,24 @@ const MAX_REFINED: usize = 200;
 /// Points of a frame that is registered to the whole.
 const POINTS: usize = 6000;
 
-/// Joint optimisation over key frames; frames between follow their neighbours.
-pub(crate) fn close_turn(fuser: &mut Fuser, report: &mut FusionReport) {
+/// Joint optimisation over key frames; frames between follow their neighbours. With the normals of the whole where it is
+/// given: noise in blotches tilts those of single frames, which draws the frames together until the subject is too thin.
+pub(crate) fn close_turn(fuser: &mut Fuser, whole: Option<&Tsdf>, report: &mut FusionReport) {
     let rounds = fuser.settings.closing_rounds;
     if rounds == 0 {
         return;
     }
     let keys = fuser.kept.key_frames(MAX_CLOSED);
     let kept = &fuser.kept;
-    let views: Vec<DepthView> = keys.par_iter().map(|&i| kept.frames[i].view()).collect();
+    let view = |&i: &usize| {
+        let mut view = kept.frames[i].view();
+        if let Some(field) = whole {
+            let found = residuals(&view, field, &kept.frames[i].model_from_camera, 1);
+            settle(&mut view, &found, f32::INFINITY);
+        }
+        view
+    };
+    let views: Vec<DepthView> = keys.par_iter().map(view).collect();
     let sensors: Vec<usize> = keys.iter().map(|&i| kept.frames[i].sensor).collect();
     let mut poses: Vec<Rigid> = keys.iter().map(|&i| kept.frames[i].model_from_camera).collect();
     let closing = fuser.clock.time("close", || close(&views, &sensors, &mut poses, rounds));
@@ -39,13 +53,25 @@ pub(crate) fn close_turn(fuser: &mut Fuser, report: &mut FusionReport) {
     follow(&mut fuser.kept, &keys, &poses);
 }
 
-/// Fuses key frames and registers each of them to the whole.
+/// The field of the key frames.
 ///
 /// # Errors
 /// [`FusionError::TooLarge`] where the field outgrows its index.
-pub(crate) fn refine(fuser: &mut Fuser) -> Result<(), FusionError> {
+pub(crate) fn whole(fuser: &mut Fuser) -> Result<Tsdf, FusionError> {
     let keys = fuser.kept.key_frames(MAX_REFINED);
-    let field = fuse_again(fuser, &keys, false)?;
+    fuse_again(fuser, &keys, false)
+}
+
+/// Registers each key frame to the whole, which is fused where it is not given.
+///
+/// # Errors
+/// [`FusionError::TooLarge`] where the field outgrows its index.
+pub(crate) fn refine(fuser: &mut Fuser, given: Option<Tsdf>) -> Result<(), FusionError> {
+    let keys = fuser.kept.key_frames(MAX_REFINED);
+    let field = match given {
+        Some(field) => field,
+        None => whole(fuser)?,
+    };
     let kept = &fuser.kept;
     let registered = |&i: &usize| {
         let (view, before) = (kept.frames[i].view(), kept.frames[i].model_from_camera);
@@ -64,9 +90,9 @@ pub(crate) fn refine(fuser: &mut Fuser) -> Result<(), FusionError> {
 /// # Errors
 /// [`FusionError::TooLarge`] where the field outgrows its index.
 pub(crate) fn settle_poses(fuser: &mut Fuser) -> Result<(), FusionError> {
-    close_turn(fuser, &mut FusionReport::default());
+    close_turn(fuser, None, &mut FusionReport::default());
     if fuser.settings.refine_rounds > 0 {
-        refine(fuser)?;
+        refine(fuser, None)?;
     }
     let all: Vec<usize> = (0..fuser.kept.len()).collect();
     fuser.model.field = fuse_again(fuser, &all, false)?;

@@ -8,12 +8,16 @@ use crate::{
     report::{FusionReport, VolumeReport},
     rig::{rig_warnings, settle},
     settings::KNOWN_POSE_WITHIN_NS,
-    take::Fuser,
+    take::{Fuser, NOISE_BAND},
     timings::Timings,
 };
 
 /// An axis farther than this from the upright of the image means that the camera lies on its side, degrees.
 const LYING_DEG: f64 = 45.0;
+/// Noise whose pixels four apart agree by more than this comes in blotches (correlation).
+const BLOTCHY: f64 = 0.3;
+/// A floor that is seen bent by more than this is said, millimetres: five times what the noise of a Kinect v2 makes of a flat one.
+const BENT_FLOOR_MM: f64 = 1.0;
 /// A seam wider than this means that the subject moved, millimetres.
 const OPEN_SEAM_MM: f64 = 5.0;
 
@@ -37,11 +41,15 @@ pub(crate) fn summarise(fuser: &mut Fuser, field: &FieldSize, report: &mut Fusio
         bottom_m: v.bottom.unwrap_or(0.0),
         axis_distance_m: v.model_from_camera.translation.vector.xz().norm(),
         image_up: v.image_up,
+        floor_bend_mm: v.floor.as_ref().map(|f| f.bend * 1e3),
     });
     report.noise_mm = fuser.model.noise * 1e3;
     report.truncation_mm = f64::from(field.truncation) * 1e3;
     summarise_tracking(fuser, report);
-    report.warnings = warnings(report);
+    let mut list = warnings(report);
+    list.extend(depth_warnings(report));
+    list.append(&mut report.warnings);
+    report.warnings = list;
     let leader = &fuser.sensors[fuser.kept.leading()[0].sensor].name;
     report.warnings.extend(rig_warnings(&report.sensors, leader));
     timings(fuser, field)
@@ -67,6 +75,28 @@ fn timings(fuser: &Fuser, field: &FieldSize) -> Timings {
         field_bytes: field.bytes,
         ..fuser.clock.timings()
     }
+}
+
+/// Warnings about the depth itself.
+fn depth_warnings(report: &FusionReport) -> Vec<String> {
+    let mut list = Vec::new();
+    if NOISE_BAND * report.noise_widest_mm > report.settings.truncation * 1e3 {
+        let blotchy =
+            if report.noise_correlation > BLOTCHY { "; it comes in blotches, which averages out slowly" } else { "" };
+        list.push(format!(
+            "depth is noisy: {:.1} mm, {:.1} mm where it is worst (dark or distant cloth){blotchy}; more frames, a nearer \
+             sensor or brighter cloth help",
+            report.noise_whole_mm, report.noise_widest_mm
+        ));
+    }
+    let bend = report.volume.as_ref().and_then(|v| v.floor_bend_mm).filter(|mm| *mm > BENT_FLOOR_MM);
+    if let Some(mm) = bend {
+        list.push(format!(
+            "the floor is seen bent by {mm:.1} mm, as through a lens whose distortion the calibration does not tell (or it is \
+             uneven): calibrate the sensor, and record again; shapes may be off by millimetres"
+        ));
+    }
+    list
 }
 
 fn warnings(report: &FusionReport) -> Vec<String> {

@@ -5,8 +5,11 @@ use toile_geometry::Mesh;
 use super::{
     clean_up::clean_up,
     fuse_again::final_field,
+    noise::{Noise, measure},
+    noisy::{fuse_noisy, is_wide},
     placing::place,
-    poses::{close_turn, refine},
+    poses::{close_turn, refine, whole},
+    scale::{known_scale, scaled},
     summary::{FieldSize, summarise},
 };
 use crate::{
@@ -34,14 +37,21 @@ pub fn finish(mut fuser: Fuser, progress: &(dyn Fn(f32) + Sync)) -> Result<Scan,
     let mut report = FusionReport { settings: fuser.settings.clone(), ..FusionReport::default() };
     report.settings.poses = None;
     if fuser.settings.poses.is_none() {
-        close_turn(&mut fuser, &mut report);
+        close_turn(&mut fuser, None, &mut report);
         progress(0.3);
-        for round in 0..fuser.settings.refine_rounds {
-            refine(&mut fuser)?;
-            progress(0.3 + 0.2 * (round + 1) as f32 / fuser.settings.refine_rounds as f32);
-        }
     }
-    let field = final_field(&mut fuser)?;
+    let field = match look(&mut fuser, &mut report)? {
+        Some((whole, noise)) if is_wide(&noise, &fuser.settings) => fuse_noisy(&mut fuser, whole, &noise, &mut report)?,
+        looked => {
+            let rounds = if looked.is_some() { fuser.settings.refine_rounds } else { 0 };
+            let mut first = looked.map(|(whole, _)| whole);
+            for round in 0..rounds {
+                refine(&mut fuser, first.take())?;
+                progress(0.3 + 0.2 * (round + 1) as f32 / rounds as f32);
+            }
+            final_field(&mut fuser)?
+        }
+    };
     progress(0.7);
     let size = FieldSize { blocks: field.block_count(), bytes: field.bytes(), truncation: field.truncation() };
     let raw = extract(&mut fuser, field)?;
@@ -49,17 +59,30 @@ pub fn finish(mut fuser: Fuser, progress: &(dyn Fn(f32) + Sync)) -> Result<Scan,
     let scan_from_model = place(&fuser, &raw, &mut report);
     let mesh = raw.transformed(&scan_from_model);
     drop(raw);
-    let mesh = clean(&mut fuser, mesh, &mut report);
+    let mut mesh = clean(&mut fuser, mesh, &mut report);
+    let scale = known_scale(&fuser, &mesh, &mut report);
+    mesh.positions.iter_mut().for_each(|p| *p *= scale as f32);
     progress(1.0);
     let timings = summarise(&mut fuser, &size, &mut report);
     let trajectory = fuser.kept.frames.into_iter().map(|k| TrackedFrame {
         sensor: k.sensor,
         index: k.index,
         device_time_ns: k.device_time_ns,
-        scan_from_camera: scan_from_model * k.model_from_camera,
+        scan_from_camera: scaled(scan_from_model * k.model_from_camera, scale),
         tracked: k.tracked,
     });
     Ok(Scan { mesh, trajectory: trajectory.collect(), report, timings })
+}
+
+/// Looks at the noise against the whole; the whole's field goes on. `None` where poses are not to be refined.
+fn look(fuser: &mut Fuser, report: &mut FusionReport) -> Result<Option<(Tsdf, Noise)>, FusionError> {
+    if fuser.settings.poses.is_some() || fuser.settings.refine_rounds == 0 {
+        return Ok(None);
+    }
+    let whole = whole(fuser)?;
+    let noise = measure(fuser, &whole);
+    noise.enter(report);
+    Ok(Some((whole, noise)))
 }
 
 fn check_enough_frames(fuser: &Fuser) -> Result<(), FusionError> {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 use toile_geometry::camera::PinholeCamera;
 
-use super::background::Resting;
+use super::{background::Resting, bend::bend_of};
 use crate::frame::{surface_elements, unproject};
 
 /// Largest angle between the floor's normal and the direction that is up in the image, as a cosine (40°).
@@ -44,6 +44,8 @@ pub struct Floor {
     pub point: Point3<f64>,
     /// Height above the plane below which points are taken for the plane itself, metres.
     pub margin: f64,
+    /// How far a lens that the calibration does not have would bend the floor as it is seen, root mean square, metres.
+    pub bend: f64,
 }
 
 struct LevelPixel {
@@ -78,7 +80,8 @@ pub(crate) fn find_floor(
     if share < MIN_SHARE || below * 10 > subject.len() || spread(&pixels, &normal, &point) < MIN_SPREAD {
         return None;
     }
-    Some(disk_on(&pixels, subject, normal, point))
+    let bend = bend_of(&members(&pixels, &normal, &point, 1).iter().map(|u| u.point).collect::<Vec<_>>());
+    Some(Floor { bend, ..disk_on(&pixels, subject, normal, point) })
 }
 
 fn upward_pixels(camera: &PinholeCamera, resting: &Resting, up: &Vector3<f32>) -> Vec<LevelPixel> {
@@ -170,7 +173,7 @@ fn disk_on(pixels: &[LevelPixel], subject: &[Point3<f32>], normal: Vector3<f64>,
         let points: Vec<Point3<f64>> = level.iter().map(|u| u.point).collect();
         (n, on) = fit_plane(&points, &n).unwrap_or((n, on));
     }
-    Floor { normal: n, point: on, margin: margin(&level, &n, &on) }
+    Floor { normal: n, point: on, margin: margin(&level, &n, &on), bend: 0.0 }
 }
 
 /// Height over a level above which a single frame's pixels are not the level's own: unevenness and noise together.

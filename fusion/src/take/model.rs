@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// The band is at least this many standard deviations of the noise wide to either side.
-const NOISE_BAND: f64 = 4.5;
+pub(crate) const NOISE_BAND: f64 = 4.5;
 /// And at most this many times as wide as set.
 const WIDEST_BAND: f64 = 3.0;
 /// Averaging window of normals before the noise is known, pixels.
@@ -24,6 +24,8 @@ pub(crate) struct Model {
     pub field: Tsdf,
     /// Standard deviation of the depth noise, metres.
     pub noise: f64,
+    /// Least half width of the band, metres; `None`: as the noise asks for.
+    band: Option<f64>,
     /// Half width of the averaging of normals, pixels.
     pub window: usize,
     /// Sums over all integrations.
@@ -37,6 +39,7 @@ impl Model {
             truncation: settings.truncation,
             field: Tsdf::new(settings.voxel_size, settings.truncation, false),
             noise: 0.0,
+            band: None,
             window: FIRST_WINDOW,
             touched: Touched::default(),
         }
@@ -52,9 +55,15 @@ impl Model {
         self.field = self.empty_field(false);
     }
 
+    /// Sets how wide the band must be, whatever single frames' noise asks for, metres; it is not less than as set.
+    pub(crate) fn set_band(&mut self, least: f64) {
+        self.band = Some(least);
+    }
+
     /// A field without anything in it.
     pub(crate) fn empty_field(&self, with_color: bool) -> Tsdf {
-        let truncation = self.truncation.max(NOISE_BAND * self.noise).min(WIDEST_BAND * self.truncation);
+        let least = self.band.unwrap_or(NOISE_BAND * self.noise);
+        let truncation = self.truncation.max(least).min(WIDEST_BAND * self.truncation);
         Tsdf::new(self.voxel_size, truncation, with_color)
     }
 

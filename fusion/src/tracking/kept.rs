@@ -13,6 +13,8 @@ use crate::{
 const SAME_VIEW: f64 = 0.5;
 /// Frames whose residual says what is usual.
 const USUAL: usize = 31;
+/// Frames whose colours are used at most.
+const MAX_COLORED: usize = 200;
 
 /// A frame of the model.
 pub(crate) struct KeptFrame {
@@ -121,6 +123,11 @@ impl Kept {
         let last = self.frames.iter().rev().take(USUAL);
         let mut residuals: Vec<f64> = last.filter_map(|k| k.tracked.map(|t| t.residual)).collect();
         median(&mut residuals).unwrap_or(f64::INFINITY)
+    }
+
+    /// One in this many frames gives its colours.
+    pub(crate) fn colored_step(&self) -> usize {
+        self.len().div_ceil(MAX_COLORED).max(1)
     }
 
     /// At most this many frames (and one more for each further sensor), evenly spaced from each sensor's first on.

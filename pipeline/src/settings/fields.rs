@@ -87,6 +87,12 @@ pub const FIELDS: &[Field] = &[
         "Whose way the fit goes: robust and coarse to fine, or eq. 4 as the seed prints it.",
     ),
     number(
+        "fusion.known_height",
+        "metres",
+        [0.0, 3.0],
+        "Height of the subject's highest point over what it stands on, as it stands there; the scan is scaled to it. 0: not known.",
+    ),
+    number(
         "fit.components",
         "components",
         [1.0, 1000.0],

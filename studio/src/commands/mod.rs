@@ -14,6 +14,7 @@ pub mod fuse;
 pub mod import;
 pub mod inspect;
 pub mod measure;
+mod nuisances;
 mod output;
 mod prior;
 pub mod process;

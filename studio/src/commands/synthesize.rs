@@ -17,6 +17,7 @@ use toile_synthetic::{
     folder::write_subject_folder, record::record_subject,
 };
 
+use super::nuisances::NuisanceOptions;
 use crate::{StudioError, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
@@ -28,7 +29,8 @@ Examples:
   toile synthesize --out olga --seed 7 --garments trousers,tshirt,jacket
   toile synthesize --out olga-folders --as folders --sensor kinect1 --sway 0.8
   toile synthesize --out rig --sensors 3 --rig-error 20 --garments \"\"
-  toile synthesize --out fixed --sensors 4 --motion still --frames 3 --fps 30";
+  toile synthesize --out fixed --sensors 4 --motion still --frames 3 --fps 30
+  toile synthesize --out black --garments trousers --dark trousers       # one nuisance; see \"Nuisances\"";
 
 /// Make a synthetic subject with its truth: for training, tests and trials of a rig
 #[derive(Debug, clap::Args)]
@@ -81,6 +83,8 @@ pub struct Synthesize {
     tilt: f64,
     #[command(flatten)]
     rig: RigArgs,
+    #[command(flatten)]
+    nuisances: NuisanceOptions,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
@@ -214,7 +218,9 @@ impl Synthesize {
             let unknown = || StudioError::Usage(format!("--garments: there is no `{name}`; choose of {kinds}"));
             kind.map(GarmentSettings::of).ok_or_else(unknown)
         };
-        let garments = self.garments.iter().filter(|n| !n.is_empty()).map(garment).collect::<Result<_, _>>()?;
+        let mut garments =
+            self.garments.iter().filter(|n| !n.is_empty()).map(garment).collect::<Result<Vec<_>, _>>()?;
+        let nuisances = self.nuisances.resolve(&mut garments)?;
         let sensors = SensorPreset::ALL.map(SensorPreset::name).join(", ");
         let sensor = SensorPreset::from_name(&self.sensor).ok_or_else(|| {
             StudioError::Usage(format!("--sensor: there is no `{}`; choose of {sensors}", self.sensor))
@@ -244,6 +250,7 @@ impl Synthesize {
             breathing_m: 1e-3 * self.breathing,
             distance_m: self.distance,
             noise: !self.clean,
+            nuisances,
             ..SyntheticSettings::default()
         };
         settings.validate().map_err(|e| StudioError::Usage(e.to_string()))?;
