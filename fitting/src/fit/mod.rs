@@ -1,16 +1,20 @@
 //! Shape and pose of one scan: prepared, started from several headings, refined, judged.
 
 mod arms;
+mod astray;
 mod body;
+mod choose;
 mod evidence;
 mod fingers;
 mod guides;
+mod hands;
 mod matches;
 mod placement;
 mod prepare;
 mod problem;
 mod report;
 mod resolution;
+mod search;
 mod seed;
 mod starts;
 mod verdict;

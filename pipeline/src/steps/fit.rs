@@ -107,7 +107,7 @@ impl<'a> Fit<'a> {
 impl Step for Fit<'_> {
     type Report = FitReport;
     const NAME: &'static str = "fit";
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
     const SECONDS: f64 = 4.0;
 
     fn label(&self) -> String {

@@ -22,7 +22,7 @@ const TABLE: &[Row] = &[
     row("fusion", &["geometry", "capture"], &[]),
     row("stereo", &["geometry", "capture"], &["outside"]),
     row("character", &["geometry"], &["outside"]),
-    row("fitting", &["geometry", "character"], &["outside", "synthetic"]),
+    row("fitting", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("garments", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("animation", &["geometry", "character"], &["outside"]),
     row("avatar", &["geometry", "character"], &[]),
