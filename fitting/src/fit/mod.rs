@@ -20,6 +20,8 @@ mod starts;
 mod verdict;
 
 pub(crate) use fingers::fit_hands_again;
+pub(crate) use problem::BodyProblem;
+pub(crate) use search::{Depths, Search};
 pub use {
     body::{BodyFit, fit_body},
     prepare::Mend,

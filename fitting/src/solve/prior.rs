@@ -132,6 +132,7 @@ fn standing_sigma(joint: Joint) -> f64 {
 
 /// Standard deviation of a joint's rotation about the A-pose in someone who stands anyhow, degrees: a half of what healthy
 /// joints can do (American Academy of Orthopaedic Surgeons, ranges of motion).
+#[expect(clippy::match_same_arms, reason = "a table, in the order of the body")]
 fn roaming_sigma(joint: Joint) -> f64 {
     use Joint::*;
     match joint {

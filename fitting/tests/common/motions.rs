@@ -75,7 +75,7 @@ pub fn diverse(model: &BodyModel, moments: &[Moment], count: usize) -> Vec<usize
     while out.len() < count.min(moments.len()) {
         let chance = ((numbers.next() * 0.5 + 0.5) * moments.len() as f64) as usize % moments.len();
         let farthest = (0..moments.len()).max_by(|a, b| nearest[*a].total_cmp(&nearest[*b])).unwrap_or(0);
-        let next = if out.len() % 2 == 0 { chance } else { farthest };
+        let next = if out.len().is_multiple_of(2) { chance } else { farthest };
         out.push(next);
         (0..moments.len()).for_each(|k| nearest[k] = nearest[k].min(gap(k, next)));
     }
