@@ -18,7 +18,7 @@ pub struct JointLimit {
 }
 
 /// The limits of a body whose joints rest in the A-pose at `skeleton`: knees and elbows are hinges that do not bend
-/// backwards, feet tip a little, the neck does not turn the head backwards.
+/// backwards, feet tip as far as on tiptoe, the neck does not turn the head backwards.
 pub fn joint_limits(skeleton: &Skeleton) -> Vec<JointLimit> {
     use Joint::*;
     let degrees = |joint, axis: Vector3<f64>, low: f64, high: f64| JointLimit {
@@ -42,7 +42,8 @@ pub fn joint_limits(skeleton: &Skeleton) -> Vec<JointLimit> {
         out.push(degrees(knee, Vector3::z(), -8.0, 8.0));
     }
     for foot in [LeftFoot, RightFoot] {
-        out.push(degrees(foot, Vector3::x(), -40.0, 30.0));
+        // on tiptoe the ankle bends by 50° (American Academy of Orthopaedic Surgeons, ranges of motion)
+        out.push(degrees(foot, Vector3::x(), -40.0, 50.0));
     }
     out
 }

@@ -1,4 +1,4 @@
-//! Fits the shipped body to a mesh: `fit_scan SCAN.ply OUT_FOLDER`; writes body.ply, model.ply, rigged weights' check.
+//! Fits the shipped body to a mesh: `fit_scan SCAN.ply OUT_FOLDER [dressed]`; writes body.ply, model.ply, rigged weights' check.
 
 use std::{path::Path, time::Instant};
 
@@ -9,12 +9,14 @@ use toile_geometry::ply;
 #[allow(clippy::print_stdout)]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [scan, out] = &arguments[..] else { return Err("usage: fit_scan SCAN.ply OUT_FOLDER".into()) };
+    let [scan, out, others @ ..] = &arguments[..] else {
+        return Err("usage: fit_scan SCAN.ply OUT_FOLDER [dressed]".into());
+    };
+    let settings = FitSettings { dressed: others.iter().any(|o| o == "dressed"), ..FitSettings::default() };
     let model = BodyModel::load_default()?;
     let scan = ply::read(Path::new(scan))?;
     let start = Instant::now();
-    let fit =
-        fit_body(&model, &scan, &FitSettings::default(), &|p| println!("{:.2} s: {p}", start.elapsed().as_secs_f64()))?;
+    let fit = fit_body(&model, &scan, &settings, &|p| println!("{:.2} s: {p}", start.elapsed().as_secs_f64()))?;
     println!("{:.2} s, {} triangles", start.elapsed().as_secs_f64(), scan.triangles.len());
     println!("{}", serde_json::to_string_pretty(&fit.report)?);
     println!("{:?}", fit.measurements);

@@ -57,8 +57,8 @@ pub struct FitSettings {
     /// Standard deviation of the scan's surface that fine residuals are weighed by, metres, 0.00001 to 0.1. Default 0.002.
     /// Only `toile`.
     pub noise: f64,
-    /// Gauss–Newton steps of the finest resolution at most, 0 to 1000. Default 12; closest points without priors need
-    /// some 60.
+    /// Gauss–Newton steps of the finest resolution at most, 0 to 1000. Default 24, of which a fit that
+    /// comes to rest needs some five; closest points without priors need some 60.
     pub fine_iterations: usize,
     /// Whether the body takes on the scan's own surface. Default true; the seed's does not.
     pub conform: bool,
@@ -77,7 +77,7 @@ impl Default for FitSettings {
             headings: 8,
             shape_sigma: 1.0,
             noise: 0.002,
-            fine_iterations: 12,
+            fine_iterations: 24,
             conform: true,
             conformation: ConformSettings::default(),
         }

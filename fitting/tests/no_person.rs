@@ -90,3 +90,14 @@ fn what_is_not_a_person_is_refused_even_where_clothes_are_expected() {
         assert_eq!(fit.verdict(), Verdict::Failed, "{name}: {:?}", fit.report);
     }
 }
+
+#[test]
+fn the_upper_half_of_a_person_is_not_trusted() {
+    let model = BodyModel::load_default().unwrap();
+    let whole = common::scanned(&model, &common::person(&model, 21, 40.0), 0.001, 21);
+    let is_upper = |t: usize| whole.triangles[t].iter().all(|&v| whole.positions[v as usize].y > 0.95);
+    let (upper, _) = whole.filter_triangles(is_upper);
+    let fit = fit_body(&model, &upper, &FitSettings::default(), &|_| {}).unwrap();
+    assert_ne!(fit.verdict(), Verdict::Trusted, "{:?}", fit.report);
+    assert!(!fit.report.reasons.is_empty());
+}

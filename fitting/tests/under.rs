@@ -58,6 +58,31 @@ fn the_body_is_found_under_cloth_at_any_heading_and_stays_inside() {
 }
 
 #[test]
+fn the_body_is_found_under_cloth_when_it_stands_in_another_way() {
+    let model = BodyModel::load_default().unwrap();
+    let truth = person(&model, 13, 0.0);
+    let body = model.skinned(&truth.beta);
+    let lower: &[(Joint, Vector3<f64>)] =
+        &[(Joint::LeftUpperArm, Vector3::z() * -0.6), (Joint::RightUpperArm, Vector3::z() * 0.6)];
+    let hand_forward: &[(Joint, Vector3<f64>)] =
+        &[(Joint::LeftUpperArm, Vector3::z() * -0.3), (Joint::LeftLowerArm, Vector3::new(-1.0, -1.0, 0.0) * 1.0)];
+    let step: &[(Joint, Vector3<f64>)] =
+        &[(Joint::LeftUpperLeg, Vector3::x() * -0.5), (Joint::RightUpperLeg, Vector3::x() * 0.35)];
+    for (name, turns) in [("arms lower", lower), ("an elbow bent", hand_forward), ("a step", step)] {
+        let mut next = truth.pose.clone();
+        for (joint, turn) in turns {
+            let rotation = next.rotation_mut(*joint);
+            *rotation = UnitQuaternion::from_scaled_axis(*turn) * *rotation;
+        }
+        let scan = dressed(&model, &truth.beta, &next, 0.012);
+        let fit = pose_under(&body, &[], &truth.pose, &scan, &UnderSettings::default(), &|_| {}).unwrap();
+        let error = mean_distance(&body.posed(&fit.pose), &body.posed(&next));
+        assert!(error < 0.008, "{name}: {error} m off, {:?}", fit.report);
+        assert_ne!(fit.report.verdict, Verdict::Failed, "{name}: {:?}", fit.report);
+    }
+}
+
+#[test]
 fn the_same_clothes_again_give_the_same_pose_again() {
     let model = BodyModel::load_default().unwrap();
     let truth = person(&model, 12, 0.0);

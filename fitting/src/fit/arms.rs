@@ -49,7 +49,7 @@ pub(crate) fn found_arms(problem: &BodyProblem, state: &State) -> Option<State> 
 }
 
 /// Scan samples with none of the body's vertices `of` near them on the same side; `None` where all are explained.
-fn unexplained(scan: &Samples, posed: &Posed, of: &[usize]) -> Option<Samples> {
+pub(super) fn unexplained(scan: &Samples, posed: &Posed, of: &[usize]) -> Option<Samples> {
     let points = of.iter().map(|&v| posed.points[v]).collect();
     let normals = of.iter().map(|&v| posed.normals[v]).collect();
     let body = Cloud::new(Samples { points, normals, ..Samples::default() })?;

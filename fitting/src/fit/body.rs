@@ -5,12 +5,14 @@ use toile_character::{BodyModel, Joint, JointRegressor, Pose, Skeleton, SkinnedM
 use toile_geometry::{Mesh, bvh::Bvh};
 
 use super::{
+    astray::Astray,
+    choose::best_start,
     evidence::seen_vertices,
     fingers::fit_fingers,
     guides::Guides,
     prepare::{Mend, Prepared, prepare},
     report::{FitReport, Verdict},
-    resolution::{Resolution, Resolutions, Sampled},
+    resolution::{Resolutions, Sampled},
     seed::{seed_fit, seed_start},
     starts::{Start, starts},
     verdict::judge,
@@ -61,8 +63,6 @@ impl BodyFit {
     }
 }
 
-/// Number of coarse starts that are taken to the middle resolution: the right heading and the one it is confused with.
-const HEADINGS_COMPARED: usize = 2;
 /// Scan within this of the body shows it, metres, as in the verdict's coverage of skin.
 const SEEN: f32 = 0.015;
 /// Turns below this are rounding, radians.
@@ -92,24 +92,15 @@ pub fn fit_body(
     let prepared = prepare(scan)?;
     let trust = trust_of(&prepared.mesh);
     let by_hand = set_by_hand(model, settings, prepared.scale, &prepared.mesh)?;
-    let guides = Guides::new(model, &by_hand);
-    let resolutions = Resolutions::new(settings);
-    let best = match settings.method {
-        Method::Toile => {
-            let coarse = resolutions.coarse;
-            let starts = starts(model, &prepared.mesh, &trust, &prepared.ups, &guides, settings.headings, coarse)?;
-            progress(0.25);
-            best_start(model, (&prepared.mesh, &trust), &guides, settings, starts, resolutions.heading)?
-        }
-        Method::Seed => seed_start(model, &prepared.mesh, &trust, &prepared.ups, settings)?,
-    };
+    let lying = Bvh::new(&prepared.mesh.positions, &prepared.mesh.triangles);
+    let best = started(model, &prepared, (&trust, &lying), &Guides::new(model, &by_hand), settings, progress)?;
     let (scan, state, mend) = stand(&prepared, model, best.state, best.up);
     let by_hand = turned(by_hand, &mend.rotation);
     progress(0.45);
     let mut fine = match settings.method {
         Method::Toile => {
             let guides = Guides::new(model, &by_hand);
-            refine(model, (&scan, &trust), &guides, settings, state, [resolutions.middle, resolutions.fine])?
+            refine(model, (&scan, &trust), &guides, settings, state, best.is_usual)?
         }
         Method::Seed => seed_fit(model, &scan, &trust, settings, state)?,
     };
@@ -118,13 +109,15 @@ pub fn fit_body(
         fine.state = fit_fingers(model, &scan, &trust, fine.state)?;
     }
     progress(0.7);
-    let bvh = Bvh::new(&scan.positions, &scan.triangles);
+    let is_upright = mend.rotation == UnitQuaternion::identity();
+    let bvh = if is_upright { lying } else { Bvh::new(&scan.positions, &scan.triangles) };
+    let astray = Astray::of_fit(model, (&scan, &trust, &bvh), settings, &fine.state)?;
     let landmarks = landmarks(model, &fine.state, &scan, &bvh, &trust, &by_hand);
     let points = conform(model, &fine.state, &scan, &bvh, &trust, settings, &landmarks)?;
     progress(0.95);
     let body = at_rest(model, &fine.state, &points);
     let measurements = measured(model, &body, &fine.state.pose);
-    let mut report = judge(model, (&scan, &trust), &fine, &points, &measurements, settings.dressed);
+    let mut report = judge(model, (&scan, &trust), &fine, &points, &measurements, &astray, settings.dressed);
     report.notices.splice(0..0, notices(prepared.notices, &mend));
     let seen = seen_vertices(model, &points, (&scan, &trust), SEEN);
     progress(1.0);
@@ -134,39 +127,35 @@ pub fn fit_body(
     Ok(BodyFit { beta, pose, skeleton, body, model_mesh, mend, landmarks, measurements, seen, report })
 }
 
+/// The state from which a scan is fitted finely.
+fn started(
+    model: &BodyModel,
+    prepared: &Prepared,
+    (trust, bvh): (&[f32], &Bvh),
+    guides: &Guides,
+    settings: &FitSettings,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Start, FittingError> {
+    let (scan, ups) = (&prepared.mesh, &prepared.ups);
+    match settings.method {
+        Method::Toile => {
+            let resolutions = Resolutions::new(settings);
+            let starts = starts(model, scan, trust, ups, guides, settings.headings, resolutions.coarse)?;
+            progress(0.25);
+            best_start(model, (scan, trust, bvh), guides, settings, starts, &resolutions)
+        }
+        Method::Seed => seed_start(model, scan, trust, ups, settings),
+    }
+}
+
 /// Landmarks in a frame that is turned by `rotation`.
 fn turned(landmarks: HandLandmarks, rotation: &UnitQuaternion<f64>) -> HandLandmarks {
     landmarks.into_iter().map(|(name, p)| (name, (rotation * Point3::from(p)).into())).collect()
 }
 
-/// Takes the best starts to the resolution at which front and back differ, and keeps the one that agrees best.
-pub(super) fn best_start(
-    model: &BodyModel,
-    (scan, trust): (&Mesh, &[f32]),
-    guides: &Guides,
-    settings: &FitSettings,
-    starts: Vec<Start>,
-    heading: Resolution,
-) -> Result<Start, FittingError> {
-    let sampled = Sampled::new(model, scan, trust, guides, heading)?;
-    let prior = JointPrior::standing(&model.mean_skeleton);
-    let problem = sampled.problem(&prior, settings.shape_sigma);
-    let mut iterations = starts.iter().map(|s| s.iterations).sum();
-    let mut best: Option<Start> = None;
-    for start in starts.into_iter().take(HEADINGS_COMPARED) {
-        let end = descend(&problem, start.state.with_components(sampled.components), heading.iterations)?;
-        iterations += end.iterations;
-        let misfit = problem.misfit(&end.state);
-        if best.as_ref().is_none_or(|b| misfit < b.misfit) {
-            best = Some(Start { state: end.state, up: start.up, misfit, iterations: 0 });
-        }
-    }
-    best.map(|b| Start { iterations, ..b }).ok_or(FittingError::Singular { what: "the heading" })
-}
-
 /// Turns scan and state upright.
-fn stand(prepared: &Prepared, model: &BodyModel, mut state: State, up: usize) -> (Mesh, State, Mend) {
-    let turn = Mend { scale: 1.0, rotation: prepared.ups[up] };
+fn stand(prepared: &Prepared, model: &BodyModel, mut state: State, up: UnitQuaternion<f64>) -> (Mesh, State, Mend) {
+    let turn = Mend { scale: 1.0, rotation: up };
     if !turn.is_identity() {
         let turned = Isometry3::from_parts(Translation3::identity(), turn.rotation);
         state.pose = state.pose.moved(&turned, &model.skeleton_at(&state.beta));
@@ -181,11 +170,13 @@ fn refine(
     guides: &Guides,
     settings: &FitSettings,
     state: State,
-    resolutions: [Resolution; 2],
+    is_usual: bool,
 ) -> Result<Descent, FittingError> {
-    let prior = JointPrior::standing(&model.mean_skeleton);
+    let skeleton = &model.mean_skeleton;
+    let prior = if is_usual { JointPrior::standing(skeleton) } else { JointPrior::roaming(skeleton) };
     let mut end = Descent { state, iterations: 0, converged: false };
-    for resolution in resolutions {
+    let resolutions = Resolutions::new(settings);
+    for resolution in [resolutions.middle, resolutions.fine] {
         let sampled = Sampled::new(model, scan, trust, guides, resolution)?;
         let problem = sampled.problem(&prior, settings.shape_sigma);
         let next = descend(&problem, end.state.with_components(sampled.components), resolution.iterations)?;

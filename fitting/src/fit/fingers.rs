@@ -142,6 +142,7 @@ impl ScanAround {
             guide: None,
             shape_sigma: 1.0, // no coefficient is free
             is_rooted: true,
+            rest: 0.0,
         }
     }
 }

@@ -124,7 +124,7 @@ impl Problem for Driven<'_> {
         Linearised { equations, frames, bounds: Vec::new() }
     }
 
-    fn is_small(&self, step: &[f64]) -> bool {
+    fn is_small(&self, step: &[f64], _: f64) -> bool {
         step.iter().all(|d| d.abs() < SMALL_STEP)
     }
 

@@ -28,6 +28,8 @@ pub(crate) struct BodyProblem<'a> {
     pub shape_sigma: f64,
     /// The translation stays as it is: only joints turn.
     pub is_rooted: bool,
+    /// The squared Newton decrement below which the descent has come to rest; 0 where only short steps say so.
+    pub rest: f64,
 }
 
 impl Problem for BodyProblem<'_> {
@@ -50,9 +52,10 @@ impl Problem for BodyProblem<'_> {
         Linearised { equations, frames: posed.frames, bounds: Vec::new() }
     }
 
-    fn is_small(&self, step: &[f64]) -> bool {
+    fn is_small(&self, step: &[f64], decrement: f64) -> bool {
         let (moves, betas) = step.split_at(self.columns.first_beta());
-        moves.iter().all(|d| d.abs() < SMALL_MOVE) && betas.iter().all(|d| d.abs() < SMALL_BETA)
+        let is_short = moves.iter().all(|d| d.abs() < SMALL_MOVE) && betas.iter().all(|d| d.abs() < SMALL_BETA);
+        is_short || decrement < self.rest
     }
 
     fn solved_for(&self) -> &'static str {

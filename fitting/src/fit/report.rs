@@ -48,6 +48,12 @@ pub struct FitReport {
     pub body_covered: f64,
     /// Share of the scan's trusted surface that lies within 20 mm of the body (100 mm where the person is dressed), 0–1.
     pub scan_explained: f64,
+    /// Share of the scan's trusted surface that lies farther than 30 mm from any skin, but for what lies nearest to the head
+    /// (hair), 0–1: a limb that was not found.
+    pub limbs_unexplained: f64,
+    /// Share of the skin of one region (the worst, but for the head) that lies deep inside the scan, 0–1: a limb that was laid into
+    /// the body.
+    pub limb_buried: f64,
     /// Share of the head's outer surface with scan within 15 mm, dressed or not, 0–1.
     pub head_covered: f64,
     /// Root mean square of β: 1 for an ordinary body.

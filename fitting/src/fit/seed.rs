@@ -41,7 +41,13 @@ pub(crate) fn seed_start(
         let heading = TAU * h as f64 / settings.headings as f64;
         let state = Placement::new(model, scan, &ups[up], sampled.components).state(model, heading, 0.0, &ups[up]);
         let end = descend(&problem, state, coarse.iterations)?;
-        Ok(Start { misfit: problem.mean_distance(&end.state), state: end.state, up, iterations: end.iterations })
+        Ok(Start {
+            misfit: problem.mean_distance(&end.state),
+            state: end.state,
+            up: ups[up],
+            iterations: end.iterations,
+            is_usual: true,
+        })
     };
     let all = turns.into_par_iter().map(coarse_fit).collect::<Result<Vec<_>, _>>()?;
     let best = all.into_iter().reduce(|a, b| if b.misfit < a.misfit { b } else { a });

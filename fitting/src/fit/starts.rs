@@ -24,16 +24,18 @@ const ARM_TURNS: [f64; 3] = [0.0, -25.0, 35.0];
 /// Number of starts that are refined.
 const REFINED: usize = 4;
 /// Standard deviation that the coarse shape is held to, in those of β: height and girth of nearly everybody.
-const COARSE_SHAPE_SIGMA: f64 = 1.0;
+pub(crate) const COARSE_SHAPE_SIGMA: f64 = 1.0;
 
 /// A coarse fit of one start.
 pub(crate) struct Start {
     pub state: State,
-    /// Index of the up rotation it stands by.
-    pub up: usize,
+    /// The rotation that turns the scan upright.
+    pub up: UnitQuaternion<f64>,
     /// Coarse misfit, 0–1.
     pub misfit: f64,
     pub iterations: usize,
+    /// Found from the usual stances, not by searching any pose.
+    pub is_usual: bool,
 }
 
 /// The best coarse fits, best first. `ups` are the rotations that may turn the scan upright.
@@ -65,8 +67,8 @@ pub(crate) fn starts(
     Ok(refined)
 }
 
-fn ended(problem: &BodyProblem, up: usize, end: Descent) -> Start {
-    Start { misfit: problem.misfit(&end.state), state: end.state, up, iterations: end.iterations }
+fn ended(problem: &BodyProblem, up: UnitQuaternion<f64>, end: Descent) -> Start {
+    Start { misfit: problem.misfit(&end.state), state: end.state, up, iterations: end.iterations, is_usual: true }
 }
 
 /// All starts, driven by landmarks where some were set by hand and judged without moving them further: the best arms for
@@ -86,7 +88,13 @@ fn candidates(
         let [first, others @ ..] = ARM_TURNS.map(|arms| {
             let state = places[up].state(model, heading, arms.to_radians(), &ups[up]);
             let state = problem.guide.map_or(Ok(state.clone()), |guide| guide.drive(&state))?;
-            Ok::<_, FittingError>(Start { misfit: problem.misfit(&state), state, up, iterations: 0 })
+            Ok::<_, FittingError>(Start {
+                misfit: problem.misfit(&state),
+                state,
+                up: ups[up],
+                iterations: 0,
+                is_usual: true,
+            })
         });
         others.into_iter().try_fold(first?, |a, b| b.map(|b| if b.misfit < a.misfit { b } else { a }))
     };

@@ -2,10 +2,10 @@
 
 use nalgebra::UnitQuaternion;
 use toile_character::BodyModel;
-use toile_geometry::Mesh;
+use toile_geometry::{Mesh, bvh::Bvh};
 
 use super::{
-    body::best_start,
+    choose::best_start,
     guides::Guides,
     prepare::{Prepared, prepare},
     resolution::Resolutions,
@@ -32,8 +32,8 @@ pub fn find_upright(
     let guides = Guides::new(model, &by_hand);
     let resolutions = Resolutions::new(settings);
     let starts = starts(model, &mesh, &trust, &ups, &guides, settings.headings, resolutions.coarse)?;
-    let best = best_start(model, (&mesh, &trust), &guides, settings, starts, resolutions.heading)?;
-    Ok(ups[best.up])
+    let bvh = Bvh::new(&mesh.positions, &mesh.triangles);
+    Ok(best_start(model, (&mesh, &trust, &bvh), &guides, settings, starts, &resolutions)?.up)
 }
 
 #[cfg(test)]

@@ -18,8 +18,9 @@ pub(crate) trait Problem {
     /// The problem linearised at `state`, with fresh correspondences.
     fn linearised(&self, state: &State) -> Linearised;
 
-    /// Whether a step over [`Problem::columns`] is too small to go on.
-    fn is_small(&self, step: &[f64]) -> bool;
+    /// Whether a step over [`Problem::columns`] is too small to go on. `decrement`: twice by how much the step is to lower the
+    /// cost ½ Σ (r / σ)² (Newton's decrement, squared).
+    fn is_small(&self, step: &[f64], decrement: f64) -> bool;
 
     /// The unknown that is solved for, as an error names it.
     fn solved_for(&self) -> &'static str;
@@ -51,8 +52,9 @@ pub(crate) fn descend(problem: &impl Problem, state: State, iterations: usize) -
     let mut end = Descent { state, iterations: 0, converged: false };
     while end.iterations < iterations && !end.converged {
         let Linearised { equations, frames, bounds } = problem.linearised(&end.state);
+        let gradient = equations.g.clone();
         let step = equations.step(DAMPING, &bounds).ok_or(FittingError::Singular { what: problem.solved_for() })?;
-        end.converged = problem.is_small(step.as_slice());
+        end.converged = problem.is_small(step.as_slice(), -gradient.dot(&step));
         end.state = end.state.stepped(&shortened(step.as_slice(), problem.columns()), problem.columns(), &frames);
         end.iterations += 1;
     }

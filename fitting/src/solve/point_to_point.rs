@@ -48,7 +48,7 @@ impl Problem for PointToPoint<'_> {
         Linearised { equations, frames: posed.frames, bounds }
     }
 
-    fn is_small(&self, step: &[f64]) -> bool {
+    fn is_small(&self, step: &[f64], _: f64) -> bool {
         let (moves, betas) = step.split_at(self.columns.first_beta());
         moves.iter().all(|d| d.abs() < SMALL_MOVE) && betas.iter().all(|d| d.abs() < SMALL_BETA)
     }

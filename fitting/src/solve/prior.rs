@@ -31,6 +31,12 @@ impl JointPrior {
         Self { center: Pose::identity(), sigma, limits: joint_limits(skeleton) }
     }
 
+    /// The prior of someone who stands in any way: limbs go where their joints let them, trunk and head bend a little.
+    pub fn roaming(skeleton: &Skeleton) -> Self {
+        let sigma = toile_character::joint::JOINTS.iter().map(|&j| roaming_sigma(j).to_radians()).collect();
+        Self { center: Pose::identity(), sigma, limits: joint_limits(skeleton) }
+    }
+
     /// Drawn to `center`: body joints with standard deviation `sigma` (radians), toes with half of it, fingers with a tenth.
     pub fn around(center: Pose, sigma: f64, skeleton: &Skeleton) -> Self {
         use Joint::*;
@@ -121,6 +127,24 @@ fn standing_sigma(joint: Joint) -> f64 {
         LeftToes | RightToes => 5.0,
         LeftThumbMetacarpal | RightThumbMetacarpal => 8.0,
         _ => 8.0,
+    }
+}
+
+/// Standard deviation of a joint's rotation about the A-pose in someone who stands anyhow, degrees: a half of what healthy
+/// joints can do (American Academy of Orthopaedic Surgeons, ranges of motion).
+#[expect(clippy::match_same_arms, reason = "a table, in the order of the body")]
+fn roaming_sigma(joint: Joint) -> f64 {
+    use Joint::*;
+    match joint {
+        Hips => 180.0,
+        Spine | Chest | UpperChest => 15.0,
+        Neck | Head => 20.0,
+        LeftShoulder | RightShoulder => 12.0,
+        LeftUpperArm | RightUpperArm | LeftLowerArm | RightLowerArm => 75.0,
+        LeftUpperLeg | RightUpperLeg | LeftLowerLeg | RightLowerLeg => 60.0,
+        LeftHand | RightHand => 30.0,
+        LeftFoot | RightFoot => 20.0,
+        _ => 10.0,
     }
 }
 

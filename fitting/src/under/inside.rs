@@ -33,6 +33,11 @@ impl Inside {
         }
     }
 
+    /// Whether a point lies outside, farther than `reach` metres from the scan.
+    pub fn is_far_outside(&self, p: &Point3<f32>, reach: f32) -> bool {
+        self.bvh.closest(p, reach).is_none() && !self.bvh.contains(p)
+    }
+
     /// Which points lie more than [`OUTSIDE`] outside.
     pub fn is_outside(&self, points: &[Point3<f32>]) -> Vec<bool> {
         // Near the surface the search ends early, so it comes first.

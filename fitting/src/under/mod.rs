@@ -1,6 +1,7 @@
 //! A known person inside a more dressed scan: pose, then hands and skin.
 
 mod contain;
+mod elsewhere;
 mod inside;
 mod patches;
 mod pose;

@@ -12,6 +12,7 @@ use toile_character::{Joint, Pose, Skeleton, SkinnedMesh};
 use toile_geometry::Mesh;
 
 use super::{
+    elsewhere::{is_elsewhere, is_strained, with_limbs_laid},
     inside::Inside,
     problem::{COARSE, FINE, MIDDLE, Sampled, Source, Target},
     report::{UnderFit, UnderReport},
@@ -27,6 +28,10 @@ const REFINED: usize = 4;
 /// Gauss–Newton steps of the whole mesh, and then of its limbs, for each of them.
 const RIGID_STEPS: usize = 12;
 const LIMB_STEPS: usize = 8;
+/// Standard deviation of a joint of limbs that were laid anew, radians (17°): half of what places tried lie apart; and the
+/// Gauss–Newton steps from there.
+const LAID_SIGMA: f64 = 0.3;
+const LAID_STEPS: usize = 16;
 
 /// Poses `dressed` (the body, or the scan of the take before, rigged) inside `scan`, which shows one layer more.
 ///
@@ -55,13 +60,14 @@ pub fn pose_under(
     let fine = Sampled::new(&source, &target, &FINE, settings)?;
     let (end, inside) = match settings.method {
         Method::Toile => {
+            let inside = Inside::new(scan);
             let best = best_heading(&middle, starts, &dressed.skeleton, settings)?;
+            let best = found_elsewhere(&middle, dressed, (scan, &inside), best, settings)?;
             progress(0.6);
             let prior = JointPrior::around(best.initial, settings.joint_sigma, &dressed.skeleton);
             let problem = fine.problem(&prior, body_joints(), true);
-            let (end, inside) =
-                rayon::join(|| descend(&problem, best.now, settings.fine_iterations), || Inside::new(scan));
-            (end.map(|e| Descent { iterations: e.iterations + best.iterations, ..e })?, inside)
+            let end = descend(&problem, best.now, settings.fine_iterations)?;
+            (Descent { iterations: end.iterations + best.iterations, ..end }, inside)
         }
         Method::Seed => (seed_pose(&middle, starts.into_iter().map(|s| s.now), settings)?, Inside::new(scan)),
     };
@@ -139,6 +145,33 @@ fn best_heading(
     let iterations = ends.iter().map(|e| e.iterations).sum();
     let best = ends.into_iter().reduce(|a, b| if b.misfit < a.misfit { b } else { a });
     best.map(|b| Candidate { iterations, ..b }).ok_or(FittingError::Singular { what: "the heading" })
+}
+
+/// The candidate, or one whose limbs are laid anew where too much of the mesh lies outside the scan and that agrees better.
+fn found_elsewhere(
+    middle: &Sampled,
+    dressed: &SkinnedMesh,
+    (scan, inside): (&Mesh, &Inside),
+    best: Candidate,
+    settings: &UnderSettings,
+) -> Result<Candidate, FittingError> {
+    if !is_strained(&best.initial, &best.now, settings.joint_sigma) && !is_elsewhere(middle, inside, &best.now) {
+        return Ok(best);
+    }
+    let laid = with_limbs_laid(dressed, scan, inside, &best.now)?;
+    let mut best = best;
+    for pose in std::iter::once(best.now.pose.clone()).chain(laid) {
+        let prior = JointPrior::around(pose.clone(), LAID_SIGMA, &dressed.skeleton);
+        let start = State { pose, beta: Vec::new() };
+        let end = descend(&middle.problem(&prior, body_joints(), true), start, LAID_STEPS)?;
+        let (misfit, iterations) = (middle.misfit(&end.state), best.iterations + end.iterations);
+        best = if misfit < best.misfit {
+            Candidate { initial: end.state.pose.clone(), now: end.state, misfit, iterations }
+        } else {
+            Candidate { iterations, ..best }
+        };
+    }
+    Ok(best)
 }
 
 fn report(fine: &Sampled, inside: &Inside, end: &Descent, initial: &Pose) -> UnderReport {

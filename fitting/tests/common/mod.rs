@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use toile_character::{BodyModel, Joint, Pose};
 use toile_geometry::Mesh;
 
+pub mod motions;
 pub mod strangers;
 pub mod surface;
 pub mod tape;

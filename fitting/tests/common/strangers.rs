@@ -62,9 +62,14 @@ pub fn random_pose(body: &SkinnedMesh, numbers: &mut Numbers, wild: f64) -> Pose
 /// The part of a posed body that a turntable scan shows: no soles, no pockets, patches missing until `missing` of the surface
 /// is gone, `noise` metres along the normals.
 pub fn scanned(model: &BodyModel, body: &Mesh, missing: f64, noise: f64, numbers: &mut Numbers) -> Mesh {
+    scanned_without(body, &model.inner, missing, noise, numbers)
+}
+
+/// The same; the vertices `hidden` are never seen.
+pub fn scanned_without(body: &Mesh, hidden: &[bool], missing: f64, noise: f64, numbers: &mut Numbers) -> Mesh {
     let floor = body.positions.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
     let sole = |v: usize| body.positions[v].y < floor + 0.02 && body.normals[v].y < -0.4;
-    let mut gone: Vec<bool> = (0..body.positions.len()).map(|v| model.inner[v] || sole(v)).collect();
+    let mut gone: Vec<bool> = (0..body.positions.len()).map(|v| hidden[v] || sole(v)).collect();
     let areas = vertex_areas(body);
     let left = |gone: &[bool]| areas.iter().zip(gone).filter(|a| !a.1).map(|a| a.0).sum::<f64>();
     let whole = left(&gone);
@@ -131,7 +136,8 @@ pub fn surface_distance(model: &BodyModel, a: &Mesh, b: &Mesh) -> f64 {
     one_way(model, a, b).max(one_way(model, b, a))
 }
 
-fn one_way(model: &BodyModel, from: &Mesh, to: &Mesh) -> f64 {
+/// Mean distance from the outer skin of one surface to another, metres.
+pub fn one_way(model: &BodyModel, from: &Mesh, to: &Mesh) -> f64 {
     let bvh = Bvh::new(&to.positions, &to.triangles);
     let areas = vertex_areas(from);
     let (mut sum, mut total) = (0.0, 0.0);

@@ -56,7 +56,7 @@ impl PoseUnder<'_> {
 impl Step for PoseUnder<'_> {
     type Report = PoseReport;
     const NAME: &'static str = "pose";
-    const VERSION: u32 = 8;
+    const VERSION: u32 = 9;
     const SECONDS: f64 = 2.0;
 
     fn label(&self) -> String {

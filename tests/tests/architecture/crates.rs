@@ -24,7 +24,7 @@ const TABLE: &[Row] = &[
     row("stereo", &["geometry", "capture"], &["outside"]),
     row("calibration", &["geometry"], &["outside"]),
     row("character", &["geometry"], &["outside"]),
-    row("fitting", &["geometry", "character"], &["outside", "synthetic"]),
+    row("fitting", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("garments", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("animation", &["geometry", "character"], &["outside"]),
     row("avatar", &["geometry", "character"], &[]),
