@@ -60,7 +60,7 @@ fn tried(model: &BodyModel, body: &SkinnedMesh, pose: &Pose, seed: u64) -> (f64,
     let pose = motions::placed(body, pose, &mut numbers);
     let truth = body.posed_mesh(&pose);
     let scan = motions::scanned(model, &truth, &mut numbers);
-    let fit = fit_body(model, &scan, &FitSettings::default(), &|_| {}).unwrap();
+    let fit = fit_body(model, &scan, &FitSettings::default(), &|_| {}).expect("a scan that can be fitted");
     let surface = strangers::one_way(model, &fit.posed_body(), &truth);
     let joints =
         common::joint_distance(&fit.pose.joint_positions(&fit.skeleton), &pose.joint_positions(&body.skeleton));
