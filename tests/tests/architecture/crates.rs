@@ -59,7 +59,18 @@ const TABLE: &[Row] = &[
     ),
     row(
         "pipeline",
-        &["geometry", "scans", "capture", "fusion", "character", "fitting", "garments", "animation", "avatar", "render"],
+        &[
+            "geometry",
+            "scans",
+            "capture",
+            "fusion",
+            "character",
+            "fitting",
+            "garments",
+            "animation",
+            "avatar",
+            "render",
+        ],
         &["synthetic", "driver-synthetic"],
     ),
     // The program and the end-to-end tests bring everything together.
