@@ -87,7 +87,7 @@ impl Export<'_> {
 impl Step for Export<'_> {
     type Report = Exported;
     const NAME: &'static str = "export";
-    const VERSION: u32 = 5;
+    const VERSION: u32 = 6;
     const SECONDS: f64 = 1.0;
 
     fn label(&self) -> String {

@@ -110,7 +110,7 @@ impl<'a> Fit<'a> {
 impl Step for Fit<'_> {
     type Report = FitReport;
     const NAME: &'static str = "fit";
-    const VERSION: u32 = 8;
+    const VERSION: u32 = 9;
     const SECONDS: f64 = 4.0;
 
     fn label(&self) -> String {

@@ -46,7 +46,7 @@ impl<'a> Fuse<'a> {
 impl Step for Fuse<'_> {
     type Report = FusionReport;
     const NAME: &'static str = "fuse";
-    const VERSION: u32 = 5;
+    const VERSION: u32 = 6;
     // A turn of 100 frames.
     const SECONDS: f64 = 9.0;
 
