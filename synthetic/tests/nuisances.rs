@@ -95,9 +95,9 @@ fn what_light_does_moves_depth_where_it_says() {
     let (count, top, _, farther) = changed(Nuisances { plates_m: 0.025, ..none });
     assert!(count > 100 && farther == 0 && top > Some(300), "plates: {count} {farther} {top:?}");
     let (count, top, bottom, farther) = changed(Nuisances { strings_pixels: 40, ..none });
-    assert!(count > 20 && farther == 0 && top > Some(250), "strings: {count} {top:?} {bottom:?}");
-    let (count, _, bottom, farther) = changed(Nuisances { brim_pixels: 5, ..none });
-    assert!(count > 50 && farther == 0 && bottom < Some(180), "brim: {count} {farther} {bottom:?}");
+    assert!(count > 20 && farther < count && top > Some(250), "strings: {count} {top:?} {bottom:?}");
+    let (count, _, bottom, _) = changed(Nuisances { brim_pixels: 5, ..none });
+    assert!(count > 50 && bottom < Some(180), "brim: {count} {bottom:?}");
     let (count, ..) = changed(Nuisances { smear_degrees: 3.0, ..none });
     assert!(count > 1000, "smear: {count}");
 }
