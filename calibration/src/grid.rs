@@ -125,12 +125,20 @@ fn whole_board(cells: &BTreeMap<Cell, usize>, board: &Board) -> Option<BTreeMap<
             let inside = |c: &Cell| (x..x + w).contains(&c.0) && (y..y + h).contains(&c.1);
             let part: BTreeMap<Cell, usize> = cells.iter().filter(|c| inside(c.0)).map(|c| (*c.0, *c.1)).collect();
             let weakest = part.values().copied().max().unwrap_or(0);
-            if part.len() == board.count() && best.as_ref().is_none_or(|b| weakest < b.0) {
+            let is_whole = part.len() == board.count() && !goes_on(cells, (x, y), (w, h));
+            if is_whole && best.as_ref().is_none_or(|b| weakest < b.0) {
                 best = Some((weakest, part));
             }
         }
     }
     best.map(|b| b.1)
+}
+
+/// True where a whole row or column follows on a side of a part: it belongs to a larger board, which is not the one asked for.
+fn goes_on(cells: &BTreeMap<Cell, usize>, (x, y): Cell, (w, h): Cell) -> bool {
+    let column = |x: i32| (y..y + h).all(|y| cells.contains_key(&(x, y)));
+    let row = |y: i32| (x..x + w).all(|x| cells.contains_key(&(x, y)));
+    column(x - 1) || column(x + w) || row(y - 1) || row(y + h)
 }
 
 /// The corners row by row: columns along the longer side, rows turned from them as in the board's plane, the first corner

@@ -98,8 +98,9 @@ fn what_light_does_moves_depth_where_it_says() {
     assert!(count > 20 && farther < count && top > Some(250), "strings: {count} {top:?} {bottom:?}");
     let (count, _, bottom, _) = changed(Nuisances { brim_pixels: 5, ..none });
     assert!(count > 50 && bottom < Some(180), "brim: {count} {bottom:?}");
+    // what turns within an exposure blurs silhouettes; surfaces that face the camera stay
     let (count, ..) = changed(Nuisances { smear_degrees: 3.0, ..none });
-    assert!(count > 1000, "smear: {count}");
+    assert!((200..4000).contains(&count), "smear: {count}");
 }
 
 #[test]

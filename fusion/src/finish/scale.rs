@@ -9,7 +9,7 @@ use crate::{report::FusionReport, take::Fuser};
 
 /// Heights that differ by more than this share are not of the same thing: depth cameras are less than 3 % off.
 const FITS: f64 = 0.03;
-/// A scale that is off by more than this share is said: a hair of 3 mm on a person.
+/// A scale that is off by more than this share is said: 3 mm on a person, which hair may make.
 const SAID: f64 = 0.002;
 
 /// What the scan must be multiplied by so that its height is the known one; 1 where none is known, or where they do not

@@ -81,16 +81,16 @@ pub const FIELDS: &[Field] = &[
     ),
     switch("fusion.fill_holes", "Close all holes, and mark them in the attribute `filled`; a room is never closed."),
     number("fusion.smoothing_passes", "passes", [0.0, 100.0], "Smoothing that does not shrink."),
-    choice(
-        "fit.method",
-        &["toile", "seed"],
-        "Whose way the fit goes: robust and coarse to fine, or eq. 4 as the seed prints it.",
-    ),
     number(
         "fusion.known_height",
         "metres",
         [0.0, 3.0],
         "Height of the subject's highest point over what it stands on, as it stands there; the scan is scaled to it. 0: not known.",
+    ),
+    choice(
+        "fit.method",
+        &["toile", "seed"],
+        "Whose way the fit goes: robust and coarse to fine, or eq. 4 as the seed prints it.",
     ),
     number(
         "fit.components",
