@@ -6,6 +6,7 @@ use crate::measure::{
     definition::{Definition, MeasureKind},
     parts::Side,
     section::Tape,
+    uncertainty::MEASURED,
 };
 
 /// One measurement.
@@ -34,6 +35,11 @@ pub struct BodyMeasure {
 }
 
 impl BodyMeasure {
+    /// False where so little was seen, or so noisily, that the value is an estimate.
+    pub fn is_measured(&self) -> bool {
+        self.uncertainty_m.is_none_or(|u| u <= MEASURED)
+    }
+
     /// The value for people: centimetres with the uncertainty, and `(?)` where it is doubted.
     pub fn text(&self) -> String {
         let cm = |metres: f64| format!("{:.1}", 100.0 * metres);

@@ -146,7 +146,8 @@ impl Step for Fit<'_> {
             return Err(PipelineError::refused(&self.scan, reason));
         }
         let table = measure_table(self.model, &fit.body).map_err(wrong)?.of_fit(&fit);
-        let doubts = table.measures.iter().filter_map(|m| m.doubt.as_ref());
+        // What was not seen is marked in the table; what does not go together wants a look.
+        let doubts = table.measures.iter().filter(|m| m.is_measured()).filter_map(|m| m.doubt.as_ref());
         let said = fit.report.reasons.iter().chain(&fit.report.notices).chain(doubts);
         let warnings = said.map(|sentence| format!("body: {sentence}")).collect();
         Ok(Product::new(self.files(&scan, &fit, &table)?, fit.report, warnings))

@@ -11,7 +11,8 @@ use crate::{StudioError, commands::fit::Person, outcome::Answer, session::Sessio
 
 const AFTER: &str = "\
 Girths as a taut tape lies, heights above the soles, standing straight. Fits the body first where it has not been fitted.
-The ± holds the true value in 95 of 100 cases; (?) marks a girth that does not go with the others as it does among people.
+The ± holds the true value in 95 of 100 cases; (?) marks a girth that does not
+go with the others as it does among people, and a value that was seen too little to be measured.
 measurements.csv has a line for each measurement: name, kind, value, unit, height of the tape's middle above the soles (cm),
 definition, uncertainty (cm), share of the skin under the tape that was seen, and why it is doubted; measurements.json also has
 where each tape lies, and the landmarks. docs/measurements.md explains them all.
