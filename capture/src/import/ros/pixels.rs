@@ -92,8 +92,30 @@ pub(super) fn color(image: &Image, is_librealsense: bool) -> Result<ColorImage, 
 
 fn rows(image: &Image) -> Result<Rows, String> {
     let (width, height) = image.size;
-    if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(format!("has {width} x {height} pixels, which are too many"));
+    if width == 0 || height == 0 || u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(format!("has {width} x {height} pixels, which no picture has that is read"));
     }
     Ok(Rows { width, height, stride: image.step })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_of_four_billion_empty_rows_is_refused_at_once() {
+        let image = |width: u32, height: u32| Image {
+            time_ns: 0,
+            frame_id: "",
+            size: (width, height),
+            encoding: "16UC1",
+            is_big_endian: false,
+            step: 0,
+            data: &[],
+        };
+        for (width, height) in [(0, u32::MAX), (u32::MAX, 0), (u32::MAX, u32::MAX)] {
+            assert!(depth(&image(width, height)).unwrap_err().contains("which no picture has"), "{width} x {height}");
+            assert!(color(&Image { encoding: "rgb8", ..image(width, height) }, false).is_err());
+        }
+    }
 }
