@@ -6,8 +6,10 @@ use crate::measure::{
     definition::{Definition, MeasureKind},
     parts::Side,
     section::Tape,
-    uncertainty::MEASURED,
 };
+
+/// Half intervals beyond this are no measurement any more, metres: more than twice what ISO 20685 allows for large girths.
+pub(crate) const MEASURED: f64 = 0.02;
 
 /// One measurement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

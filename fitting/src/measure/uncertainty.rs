@@ -12,13 +12,14 @@ use toile_geometry::{Mesh, bvh::Bvh};
 
 use crate::{
     BodyFit,
-    measure::{definition::MeasureKind, taken::BodyMeasure},
+    measure::{
+        definition::MeasureKind,
+        taken::{BodyMeasure, MEASURED},
+    },
 };
 
 /// Distance between the points of a tape at which the skin is looked up, metres.
 const ALONG: f64 = 0.01;
-/// Half intervals beyond this are no measurement any more, metres: more than twice what ISO 20685 allows for large girths.
-pub(crate) const MEASURED: f64 = 0.02;
 /// The skin that matters around the end of a straight measurement, metres: about the size of a landmark's neighbourhood.
 const AROUND: f32 = 0.025;
 
