@@ -7,7 +7,6 @@ use toile_geometry::{Mesh, bvh::Bvh};
 use super::{
     astray::Astray,
     choose::best_start,
-    evidence::seen_vertices,
     fingers::fit_fingers,
     guides::Guides,
     prepare::{Mend, Prepared, prepare},
@@ -63,8 +62,6 @@ impl BodyFit {
     }
 }
 
-/// Scan within this of the body shows it, metres, as in the verdict's coverage of skin.
-const SEEN: f32 = 0.015;
 /// Turns below this are rounding, radians.
 const UPRIGHT: f64 = 1e-9;
 
@@ -117,9 +114,8 @@ pub fn fit_body(
     progress(0.95);
     let body = at_rest(model, &fine.state, &points);
     let measurements = measured(model, &body, &fine.state.pose);
-    let mut report = judge(model, (&scan, &trust), &fine, &points, &measurements, &astray, settings.dressed);
+    let (mut report, seen) = judge(model, (&scan, &trust), &fine, &points, &measurements, &astray, settings.dressed);
     report.notices.splice(0..0, notices(prepared.notices, &mend));
-    let seen = seen_vertices(model, &points, (&scan, &trust), SEEN);
     progress(1.0);
     let State { pose, beta } = fine.state;
     let model_mesh = template(model, model.posed(&beta, &pose));

@@ -33,6 +33,8 @@ pub(crate) struct Distances {
 pub(crate) struct Coverage {
     pub whole: f64,
     pub regions: BTreeMap<String, f64>,
+    /// Of each vertex, whether the scan covers it.
+    pub seen: Vec<bool>,
 }
 
 /// Samples of the trusted scan that distances are taken from.
@@ -96,7 +98,8 @@ impl Coverage {
             some / f64::max(all, 1e-12)
         };
         let region = |r: &Region| (r.words().to_owned(), share(&|v| model.regions[v] == *r));
-        Self { whole: share(&|_| true), regions: Region::ALL.iter().map(region).collect() }
+        let (whole, regions) = (share(&|_| true), Region::ALL.iter().map(region).collect());
+        Self { whole, regions, seen }
     }
 
     /// The share of one region, 0–1.
@@ -106,12 +109,7 @@ impl Coverage {
 }
 
 /// Of each vertex of a body at `points`, whether trusted scan lies within `reach` metres on the same side.
-pub(crate) fn seen_vertices(
-    model: &BodyModel,
-    points: &[Point3<f32>],
-    (scan, trust): (&Mesh, &[f32]),
-    reach: f32,
-) -> Vec<bool> {
+fn seen_vertices(model: &BodyModel, points: &[Point3<f32>], (scan, trust): (&Mesh, &[f32]), reach: f32) -> Vec<bool> {
     let Some(cloud) = Cloud::new(Samples::of_mesh(scan, &scan.normals, trust, COVER_CELL)) else {
         return vec![false; points.len()];
     };

@@ -267,7 +267,8 @@ impl Bounds {
     }
 }
 
-/// Measures a fit and judges it. `points` is the conformed body in the scan's pose, `scan` has normals.
+/// Measures a fit and judges it; the report, and of each vertex whether the scan shows its skin. `points` is the conformed body in
+/// the scan's pose, `scan` has normals.
 pub(crate) fn judge(
     model: &BodyModel,
     (scan, trust): (&Mesh, &[f32]),
@@ -276,12 +277,14 @@ pub(crate) fn judge(
     measurements: &Measurements,
     astray: &Astray,
     dressed: bool,
-) -> FitReport {
+) -> (FitReport, Vec<bool>) {
     let reach = if dressed { CLOTHES } else { SKIN };
     let State { beta, pose } = &fine.state;
     let samples = samples(scan, trust);
     let to_model = Distances::new(&samples, &model.posed(beta, pose), model);
-    let covered = Coverage::new(model, points, scan, trust, reach.covered);
+    let skin = Coverage::new(model, points, scan, trust, SKIN.covered);
+    let clothed = dressed.then(|| Coverage::new(model, points, scan, trust, CLOTHES.covered));
+    let covered = clothed.as_ref().unwrap_or(&skin);
     let mut report = FitReport {
         verdict: Verdict::Trusted,
         reasons: Vec::new(),
@@ -294,18 +297,14 @@ pub(crate) fn judge(
         scan_explained: to_model.share_within(reach.explained),
         limbs_unexplained: astray.limbs_unexplained,
         limb_buried: astray.region_buried,
-        head_covered: if dressed { bare_head(model, points, scan, trust) } else { covered.of(Region::Head) },
+        // Whatever else is dressed, a face is seen.
+        head_covered: skin.of(Region::Head),
         shape_rms: (beta.iter().map(|b| b * b).sum::<f64>() / beta.len().max(1) as f64).sqrt(),
         estimated: dressed,
-        region_covered: covered.regions,
+        region_covered: covered.regions.clone(),
     };
     decide(&mut report, measurements.stature_m);
-    report
-}
-
-/// Share of the head that the scan covers as closely as skin: whatever else is dressed, a face is seen.
-fn bare_head(model: &BodyModel, points: &[Point3<f32>], scan: &Mesh, trust: &[f32]) -> f64 {
-    Coverage::new(model, points, scan, trust, SKIN.covered).of(Region::Head)
+    (report, skin.seen)
 }
 
 /// Sets verdict and reasons; regions that do not matter for the rest of the body become a notice.

@@ -17,7 +17,7 @@ const LYING_DEG: f64 = 45.0;
 /// Noise whose pixels four apart agree by more than this comes in blotches (correlation).
 const BLOTCHY: f64 = 0.3;
 /// A floor that is seen bent by more than this is said, millimetres: generated takes of flat floors with true lenses give 0.0,
-/// a lens of 8 % that the calibration does not tell 8.4.
+/// one of k1 0.09, k2 -0.27, k3 0.095 that the calibration does not tell 8.4.
 const BENT_FLOOR_MM: f64 = 1.0;
 /// A seam wider than this means that the subject moved, millimetres.
 const OPEN_SEAM_MM: f64 = 5.0;
