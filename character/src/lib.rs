@@ -3,7 +3,7 @@
 //!
 //! - [`joint`]: the 52 VRM humanoid joints and their hierarchy;
 //! - [`Skeleton`]: where the joints of one person rest; [`Pose`]: how they are turned; [`joint_limits`]: how far they go;
-//! - [`SkinWeights`] and [`skinning`]: linear blend skinning (Hu et al. 2017, eq. 3) and its inverse;
+//! - [`SkinWeights`] and [`skinning`]: linear blend skinning (Hu et al. 2017, eq. 3), its inverse, and blending in log space;
 //! - [`BodyModel`]: the statistical body (eq. 1 joints by [`mean_value`], eq. 2 shape) from the committed asset;
 //! - [`dress_pose`]: the A- and T-pose of any skeleton;
 //! - [`Motion`]: a pose over time; [`interpolation`]: poses between poses;
@@ -59,3 +59,4 @@ pub use region::Region;
 pub use skeleton::Skeleton;
 pub use skin::SkinWeights;
 pub use skinned_mesh::SkinnedMesh;
+pub use skinning::{PosedSkin, Skinner, Skinning};

@@ -1,4 +1,32 @@
-//! Linear blend skinning (Hu et al. 2017, eq. 3) and its inverse.
+//! Skinning: linear (Hu et al. 2017, eq. 3), in log space and hybrid (Magnenat-Thalmann et al. 2004, eq. 3 and section 4.2).
+//!
+//! - [`skin`] and [`unskin`]: linear blending and its inverse, once, by matrices of single precision; in parallel;
+//! - [`Skinner`]: one mesh in pose after pose by any [`Skinning`], with normals and the local frame of each vertex;
+//! - [`twist`]: logarithms of rigid transforms, and blending in log space in double precision.
+//!
+//! ```
+//! use toile_character::{BodyModel, Joint, PosedSkin, Skinner, Skinning};
+//!
+//! let body = BodyModel::load_default()?.skinned(&[0.5]);
+//! let skinner = Skinner::new(&body.mesh, &body.weights)?;
+//! let mut pose = toile_character::Pose::identity();
+//! *pose.rotation_mut(Joint::LeftLowerArm) = nalgebra::UnitQuaternion::from_euler_angles(0.0, 1.5, 0.0);
+//! let mut posed = PosedSkin::with_frames(); // kept from frame to frame
+//! skinner.pose(&pose.skinning_transforms(&body.skeleton), Skinning::Log, &mut posed)?;
+//! let sleeve = posed.frame(7).map(|posed_from_local| posed_from_local * nalgebra::Point3::new(0.0, 0.01, 0.0));
+//! # assert!(sleeve.is_some());
+//! # Ok::<(), toile_character::CharacterError>(())
+//! ```
+
+mod groups;
+mod kernel;
+mod motions;
+mod skinner;
+pub mod twist;
+mod way;
+
+pub use skinner::{PosedSkin, Skinner};
+pub use way::Skinning;
 
 use nalgebra::{Isometry3, Matrix3x4, Matrix4, Point3};
 use rayon::prelude::*;
