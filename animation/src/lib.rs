@@ -3,6 +3,7 @@
 //! - [`bvh`]: motion files read and written;
 //! - [`retarget`]: any of the usual skeletons carried onto the target's 52 joints;
 //! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
+//! - [`blend`]: the layers of an outfit in motion, by skinning and by cloth;
 //! - [`resample`], [`close_loop`]: other rates, endless motions.
 //!
 //! ```
@@ -18,6 +19,7 @@
 //!
 //! Poses are relative to the A-pose rest of the person; +Y up, +Z the front; metres, radians, seconds.
 
+pub mod blend;
 pub mod bvh;
 mod error;
 mod retarget;

@@ -39,6 +39,7 @@ mod error;
 mod glb;
 mod layer_mesh;
 mod motion;
+mod point_cache;
 mod rig;
 mod vrm;
 
@@ -46,4 +47,5 @@ pub use dressed::{Avatar, AvatarLayer};
 pub use error::AvatarError;
 pub use glb::write_glb;
 pub use motion::{FileMotion, MotionJoint, read_motion};
+pub use point_cache::PointCache;
 pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, vrm_pose, write_vrm};

@@ -13,6 +13,7 @@
 //!
 //! A run can stop anywhere and go on later with the same result.
 
+mod animate;
 mod avatar_choice;
 mod body_edits;
 mod body_file;
@@ -41,6 +42,7 @@ mod step;
 pub mod steps;
 mod summary;
 
+pub use animate::{AnimateOptions, Animated, AnimationReport, animate};
 pub use body_edits::BodyEdits;
 pub use error::{Cause, PipelineError};
 pub use folders::Folders;
@@ -55,4 +57,5 @@ pub use run::Run;
 pub use scan_survey::ScanSurvey;
 pub use settings::Settings;
 pub use step::{Product, Remarks, Step};
+pub use toile_animation::blend::Blend;
 pub use summary::{Decided, Measured, Summary, TakeSummary};

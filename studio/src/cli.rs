@@ -52,6 +52,8 @@ pub enum Command {
     Edit(commands::edit::Edit),
     /// Write the avatar: GLB with a motion, VRM; or a take in a plain encoding
     Export(commands::export::Export),
+    /// Move the layers through a motion: skinning and cloth, as point caches
+    Animate(commands::animate::Animate),
     /// Everything from recorded takes to avatar and report: runs whatever is missing
     Process(commands::process::Process),
     /// The whole way on the recorded session that ships with Toile

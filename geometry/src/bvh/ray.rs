@@ -21,24 +21,36 @@ pub struct RayHit {
 impl Bvh {
     /// The first hit of the ray with `t` in `[0, max_t]`, from either side.
     pub fn ray(&self, origin: &Point3<f32>, direction: &Vector3<f32>, max_t: f32) -> Option<RayHit> {
-        let inverse = direction.map(|d| 1.0 / d);
-        let mut cast = Cast { bvh: self, origin: *origin, direction: *direction, inverse, limit: max_t, best: None };
+        self.ray_where(origin, direction, max_t, |_| true)
+    }
+
+    /// The first hit, as [`Bvh::ray`], of a triangle that `accept` takes.
+    pub fn ray_where(
+        &self,
+        origin: &Point3<f32>,
+        direction: &Vector3<f32>,
+        max_t: f32,
+        accept: impl Fn(u32) -> bool,
+    ) -> Option<RayHit> {
+        let (origin, direction, inverse) = (*origin, *direction, direction.map(|d| 1.0 / d));
+        let mut cast = Cast { bvh: self, origin, direction, inverse, accept, limit: max_t, best: None };
         self.tree.traverse(&mut cast);
         cast.best
     }
 }
 
-struct Cast<'a> {
+struct Cast<'a, F> {
     bvh: &'a Bvh,
     origin: Point3<f32>,
     direction: Vector3<f32>,
     inverse: Vector3<f32>,
+    accept: F,
     /// Ray parameter of the best hit so far, or the largest allowed.
     limit: f32,
     best: Option<RayHit>,
 }
 
-impl Query for Cast<'_> {
+impl<F: Fn(u32) -> bool> Query for Cast<'_, F> {
     /// Ray parameter at which the box is entered, infinite where it is missed.
     #[inline(always)]
     fn rank(&self, node: &Node) -> f32 {
@@ -61,6 +73,9 @@ impl Query for Cast<'_> {
     #[inline(always)]
     fn visit(&mut self, places: Range<usize>) {
         for place in places {
+            if !(self.accept)(self.bvh.tree.order[place]) {
+                continue;
+            }
             let hit = triangle::ray_hit(&self.origin, &self.direction, &self.bvh.corners[place]);
             if let Some((t, barycentric)) = hit.filter(|h| h.0 <= self.limit) {
                 self.limit = t;

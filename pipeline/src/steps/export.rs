@@ -61,6 +61,18 @@ impl Export<'_> {
         self.choice.motion_path(&self.run.folders)
     }
 
+    /// The avatar as its files have it: in scan 0's pose, without what is left out.
+    ///
+    /// # Errors
+    /// [`PipelineError`] where a layer cannot be read.
+    pub(crate) fn avatar(&self) -> Result<Avatar, PipelineError> {
+        let mut avatar = self.dressed()?;
+        if let Some(settings) = &self.choice.hidden {
+            leave_out_hidden(&mut avatar, settings).map_err(|e| PipelineError::stage(&self.run.folders.glb(), e))?;
+        }
+        Ok(avatar)
+    }
+
     /// The avatar at rest in scan 0's pose: the body and every garment.
     fn dressed(&self) -> Result<Avatar, PipelineError> {
         let (folders, body) = (&self.run.folders, &self.body.skinned);

@@ -1,5 +1,6 @@
 //! The commands, a file each: its options, its calls, its answer.
 
+pub mod animate;
 pub mod calibrate;
 mod calibrate_board;
 pub mod capture;

@@ -1,0 +1,37 @@
+//! Layers that move: skinning for what lies close, cloth for what hangs, and layers that stay apart.
+//!
+//! An [`Outfit`] is a body and its garments in the pose of scan 0. For each pose of a motion, in the order of the modules:
+//!
+//! 1. all layers follow the skeleton by their skin weights ([`toile_character::Skinner`]);
+//! 2. where parts of the body come so near to each other that the cloth between them has no room, the layers on either
+//!    side are pressed together in their order, and the body gives way where even that is not enough ([`squeeze`]);
+//! 3. a proxy of each garment is simulated, tied to the skinned place by springs that are the stiffer the closer the
+//!    cloth lies to the body ([`anchors`], [`proxy`]), and the scanned mesh rides on it ([`ride`]);
+//! 4. layers that still come through each other are set right at full resolution, from inside to outside ([`order`]).
+//!
+//! [`Blend::Skinning`] ends after the first step.
+
+mod anchors;
+mod order;
+mod outfit;
+mod proxy;
+mod ride;
+mod squeeze;
+mod tracker;
+mod wearer;
+
+pub use outfit::{Outfit, OutfitLayer};
+pub use wearer::Wearer;
+
+use serde::{Deserialize, Serialize};
+
+/// How the layers follow the skeleton.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Blend {
+    /// By skin weights alone.
+    Skinning,
+    /// Cloth that is held where it lies on the body, and moves freely elsewhere.
+    #[default]
+    Anchored,
+}

@@ -1,0 +1,68 @@
+//! A body and its garments, prepared for motion.
+
+use nalgebra::Point3;
+use rayon::prelude::*;
+use toile_character::{Pose, Skeleton, SkinWeights, Skinner};
+use toile_cloth::Fabric;
+use toile_geometry::Mesh;
+
+use super::{anchors::Closeness, order::Order, proxy::Proxy, squeeze::Columns};
+use crate::AnimationError;
+
+/// A layer of an outfit: the body, or a garment.
+#[derive(Debug, Clone)]
+pub struct OutfitLayer {
+    /// Name of the layer.
+    pub name: String,
+    /// The mesh in the outfit's first pose.
+    pub mesh: Mesh,
+    /// Its skin weights.
+    pub weights: SkinWeights,
+    /// What it is made of; not read for the body.
+    pub fabric: Fabric,
+}
+
+/// A body and its garments, inside to outside, in the pose in which they were scanned.
+pub struct Outfit {
+    pub(super) skeleton: Skeleton,
+    pub(super) pose0: Pose,
+    pub(super) layers: Vec<OutfitLayer>,
+    pub(super) skinners: Vec<Skinner>,
+    /// One for each garment.
+    pub(super) proxies: Vec<Proxy>,
+    pub(super) columns: Columns,
+    pub(super) order: Order,
+}
+
+impl Outfit {
+    /// Prepares the `layers` (the first is the body, the others garments from inside to outside), which are in `pose0` of
+    /// `skeleton`.
+    ///
+    /// # Errors
+    /// [`AnimationError::Motion`] where there is no body, or a layer cannot be skinned or simulated.
+    pub fn new(skeleton: Skeleton, pose0: Pose, layers: Vec<OutfitLayer>) -> Result<Self, AnimationError> {
+        let Some(body) = layers.first().filter(|b| !b.mesh.is_empty()) else {
+            return Err(AnimationError::Motion("an outfit needs a body".into()));
+        };
+        let skinner = |l: &OutfitLayer| {
+            Skinner::new(&l.mesh, &l.weights).map_err(|e| AnimationError::Motion(format!("layer {}: {e}", l.name)))
+        };
+        let skinners = layers.iter().map(skinner).collect::<Result<Vec<_>, _>>()?;
+        let closeness = Closeness::new(&body.mesh);
+        let proxies: Result<Vec<Proxy>, AnimationError> =
+            layers[1..].par_iter().map(|layer| Proxy::new(layer, &closeness)).collect();
+        let meshes: Vec<&Mesh> = layers.iter().map(|l| &l.mesh).collect();
+        let (columns, order) = (Columns::new(&meshes, &closeness), Order::new(&meshes));
+        Ok(Self { skeleton, pose0, proxies: proxies?, columns, order, skinners, layers })
+    }
+
+    /// The layers in the outfit's first pose.
+    pub fn layers(&self) -> &[OutfitLayer] {
+        &self.layers
+    }
+
+    /// Positions of a layer in the outfit's first pose.
+    pub fn scanned(&self, layer: usize) -> &[Point3<f32>] {
+        &self.layers[layer].mesh.positions
+    }
+}

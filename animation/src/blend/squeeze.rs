@@ -1,0 +1,170 @@
+//! Cloth between parts of the body that come near each other: armpit, crotch, hand on hip.
+//!
+//! Over each vertex of the body stands a column along its normal, in which all layers lie in their order. Where another part of the
+//! body stands in the column's way, half of the room between the two belongs to the column: what is higher is pressed together to fit, and
+//! where the cloth is already as thin as it gets, the skin is pressed in. Heights in a column keep their order, and columns
+//! change smoothly over the body, so that what did not cross before does not cross after.
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals, topology::VertexNeighbors};
+
+use super::anchors::{Closeness, Over};
+
+/// Farthest that another part of the body is looked for above the skin, metres: twice the height of a thick coat's sleeve.
+const REACH: f32 = 0.16;
+/// Deepest that another part of the body is looked for below the skin, metres.
+const DEPTH: f32 = 0.05;
+/// Thinnest that a layer can be pressed, metres.
+const THINNEST: f32 = 0.0008;
+/// Room left between what belongs to either side, metres.
+const MARGIN: f32 = 0.0005;
+/// Cloth above this height does not stand in the column, metres: it hangs free.
+const TALLEST: f32 = 0.06;
+/// Rounds of smoothing over the body's vertices.
+const SMOOTHINGS: usize = 6;
+
+/// The columns over the body.
+pub(crate) struct Columns {
+    triangles: Vec<[u32; 3]>,
+    neighbours: VertexNeighbors,
+    /// How deep below the skin a ray may start and still be inside this part of the body, metres.
+    depths: Vec<f32>,
+    /// Height of the topmost layer over each vertex in the outfit's first pose, metres.
+    tops: Vec<f32>,
+    /// Layers over each vertex.
+    counts: Vec<f32>,
+    /// Where the vertices of each garment's mesh stand.
+    over: Vec<Vec<Over>>,
+}
+
+/// How the columns are pressed in one pose.
+pub(crate) struct Pressed {
+    /// Height of the skin, metres: 0 or below.
+    floor: Vec<f32>,
+    /// Height above the skin over the height before, at most 1.
+    share: Vec<f32>,
+    normals: Vec<Vector3<f32>>,
+}
+
+impl Columns {
+    pub fn new(layers: &[&Mesh], closeness: &Closeness) -> Self {
+        let body = layers[0];
+        let n = body.positions.len();
+        let neighbours = VertexNeighbors::new(n, &body.triangles);
+        let (mut tops, mut counts) = (vec![0.0f32; n], vec![0.0f32; n]);
+        let mut over = Vec::new();
+        for layer in &layers[1..] {
+            let places: Vec<Over> = layer.positions.par_iter().filter_map(|p| closeness.over(p)).collect();
+            let mut covered = vec![0.0f32; n];
+            for place in places.iter().filter(|p| p.height < TALLEST) {
+                for &v in &place.corners {
+                    tops[v as usize] = tops[v as usize].max(place.height);
+                    covered[v as usize] = 1.0;
+                }
+            }
+            counts.iter_mut().zip(covered).for_each(|(c, one)| *c += one);
+            over.push(places);
+        }
+        for _ in 0..3 {
+            tops = widened(&tops, &neighbours);
+            counts = widened(&counts, &neighbours);
+        }
+        let (tops, counts) = (smoothed(&tops, &neighbours, 3), smoothed(&counts, &neighbours, 3));
+        Self { triangles: body.triangles.clone(), neighbours, depths: depths(body), tops, counts, over }
+    }
+
+    /// How the columns are pressed where the body stands at `body`.
+    pub fn press(&self, body: &[Point3<f32>]) -> Pressed {
+        let normals = vertex_normals(body, &self.triangles);
+        let bvh = Bvh::new(body, &self.triangles);
+        let faces: Vec<Vector3<f32>> = toile_geometry::mesh::triangle_normals(body, &self.triangles);
+        let room = |v: usize| {
+            let (n, depth) = (normals[v], self.depths[v]);
+            let origin = body[v] - n * depth;
+            let faces_us = |t: u32| faces[t as usize].dot(&n) < 0.0;
+            let hit = bvh.ray_where(&origin, &n, depth + REACH, faces_us);
+            hit.map_or(REACH / 2.0, |h| (h.t - depth) / 2.0)
+        };
+        let room: Vec<f32> = (0..body.len()).into_par_iter().map(room).collect();
+        // The nearest of the neighbours' too, so that no column stands taller than the one beside it can.
+        let room = widened(&room.iter().map(|r| -r).collect::<Vec<_>>(), &self.neighbours);
+        let room: Vec<f32> = smoothed(&room, &self.neighbours, SMOOTHINGS).iter().map(|r| -r).collect();
+        let mut floor = vec![0.0f32; body.len()];
+        let mut share = vec![1.0f32; body.len()];
+        for v in 0..body.len() {
+            let (room, top) = (room[v] - MARGIN, self.tops[v]);
+            if room >= top {
+                continue;
+            }
+            let thinnest = (self.counts[v] * THINNEST).min(top);
+            floor[v] = (room - thinnest).min(0.0);
+            share[v] = if top > 1e-6 { ((room - floor[v]) / top).clamp(0.02, 1.0) } else { 1.0 };
+        }
+        let floor = smoothed(&floor, &self.neighbours, SMOOTHINGS);
+        let share = smoothed(&share, &self.neighbours, SMOOTHINGS);
+        Pressed { floor, share, normals }
+    }
+
+    /// Presses the vertices of garment `k`'s mesh.
+    pub fn apply(&self, pressed: &Pressed, body: &[Point3<f32>], k: usize, positions: &mut [Point3<f32>]) {
+        pressed.apply(body, &self.over[k], positions);
+    }
+}
+
+impl Pressed {
+    /// Presses the body's own vertices.
+    pub fn apply_to_body(&self, body: &mut [Point3<f32>]) {
+        body.iter_mut().enumerate().for_each(|(v, p)| *p += self.normals[v] * self.floor[v]);
+    }
+
+    /// Presses vertices that stand `over` places of the skin, which was at `body` before it was pressed.
+    pub fn apply(&self, body: &[Point3<f32>], over: &[Over], positions: &mut [Point3<f32>]) {
+        positions.par_iter_mut().zip(over).for_each(|(p, over)| {
+            let mix = |values: &[f32]| -> f32 {
+                over.corners.iter().zip(over.barycentric).map(|(&v, w)| values[v as usize] * w).sum()
+            };
+            let (floor, share) = (mix(&self.floor), mix(&self.share));
+            if floor == 0.0 && share == 1.0 {
+                return;
+            }
+            let at = |k: usize| over.corners[k] as usize;
+            let normal: Vector3<f32> = (0..3).map(|k| self.normals[at(k)] * over.barycentric[k]).sum();
+            let Some(normal) = normal.try_normalize(1e-6) else { return };
+            let skin: Vector3<f32> = (0..3).map(|k| body[at(k)].coords * over.barycentric[k]).sum();
+            let height = (p.coords - skin).dot(&normal);
+            *p += normal * (floor + height * share - height);
+        });
+    }
+}
+
+/// How deep below each vertex of the skin the middle of its part of the body lies, metres, at most [`DEPTH`].
+fn depths(body: &Mesh) -> Vec<f32> {
+    let bvh = Bvh::new(&body.positions, &body.triangles);
+    let normals = body.vertex_normals();
+    let depth = |v: usize| {
+        let origin = body.positions[v] - normals[v] * 0.002;
+        let through = bvh.ray(&origin, &-normals[v], 4.0 * DEPTH).map_or(4.0 * DEPTH, |h| h.t);
+        (0.4 * through).min(DEPTH)
+    };
+    (0..body.positions.len()).into_par_iter().map(depth).collect()
+}
+
+/// Each value, or a neighbour's larger one.
+fn widened(values: &[f32], neighbours: &VertexNeighbors) -> Vec<f32> {
+    let largest = |v: usize| neighbours.of(v).iter().map(|&u| values[u as usize]).fold(values[v], f32::max);
+    (0..values.len()).map(largest).collect()
+}
+
+fn smoothed(values: &[f32], neighbours: &VertexNeighbors, rounds: usize) -> Vec<f32> {
+    let mut values = values.to_vec();
+    for _ in 0..rounds {
+        let mean = |v: usize| {
+            let around = neighbours.of(v);
+            let sum: f32 = around.iter().map(|&u| values[u as usize]).sum();
+            if around.is_empty() { values[v] } else { 0.5 * values[v] + 0.5 * sum / around.len() as f32 }
+        };
+        values = (0..values.len()).map(mean).collect();
+    }
+    values
+}

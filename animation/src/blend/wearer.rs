@@ -1,0 +1,214 @@
+//! An outfit in motion.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+use toile_character::{Pose, PosedSkin, Skinning};
+use toile_cloth::{Effort, MovingSurface, Obstacle, Sheet, Surroundings};
+
+use super::{
+    Blend,
+    order::Followed,
+    outfit::Outfit,
+    squeeze::Pressed,
+};
+use crate::AnimationError;
+
+/// Farthest that the body may move in one step of the simulation, metres: the reach of contact is twice that.
+const LONGEST_WAY: f32 = 0.015;
+/// Steps of the simulation in a frame: at least, at most.
+const STEPS: (usize, usize) = (2, 6);
+/// Rate at which the air and the layers below damp cloth that moves against the body, 1/s.
+const DRAG: f64 = 4.0;
+
+/// An outfit in motion: give it pose after pose.
+pub struct Wearer<'a> {
+    outfit: &'a Outfit,
+    blend: Blend,
+    way: Skinning,
+    pose: Pose,
+    sheets: Vec<Sheet>,
+    /// Skinned and pressed places of the proxies at the end of the last step.
+    carried: Vec<Vec<Vector3<f64>>>,
+    body: MovingSurface,
+    followed: Followed,
+    skins: Vec<PosedSkin>,
+    proxy_skins: Vec<PosedSkin>,
+    layers: Vec<Vec<Point3<f32>>>,
+    /// Pairs of triangles of different layers that crossed in the last frame, as far as they could not be moved apart.
+    pub crossing: usize,
+}
+
+impl<'a> Wearer<'a> {
+    /// The outfit in its first pose, at rest.
+    pub fn new(outfit: &'a Outfit, blend: Blend, way: Skinning) -> Self {
+        let layers: Vec<Vec<Point3<f32>>> = outfit.layers.iter().map(|l| l.mesh.positions.clone()).collect();
+        let sheets: Vec<Sheet> = outfit.proxies.iter().map(|p| p.sheet.clone()).collect();
+        Self {
+            blend,
+            way,
+            pose: outfit.pose0.clone(),
+            carried: sheets.iter().map(|s| s.positions.clone()).collect(),
+            sheets,
+            body: MovingSurface::new(&layers[0], &outfit.layers[0].mesh.triangles),
+            followed: outfit.order.start(),
+            skins: layers.iter().map(|_| PosedSkin::default()).collect(),
+            proxy_skins: outfit.proxies.iter().map(|_| PosedSkin::with_frames()).collect(),
+            layers,
+            crossing: 0,
+            outfit,
+        }
+    }
+
+    /// Vertices of all layers, as they were left by the last [`Wearer::advance`].
+    pub fn layers(&self) -> &[Vec<Point3<f32>>] {
+        &self.layers
+    }
+
+    /// Moves only the simulated cloth on to `pose` within `seconds`: what comes before the first frame that is looked at.
+    ///
+    /// # Errors
+    /// [`AnimationError::Motion`] where a layer cannot be moved.
+    pub fn warm_up(&mut self, pose: &Pose, seconds: f64) -> Result<(), AnimationError> {
+        if self.blend == Blend::Anchored {
+            let steps = self.steps(pose);
+            for k in 1..=steps {
+                let between = self.pose.interpolated(pose, k as f64 / steps as f64);
+                self.step(&between, seconds / steps as f64)?;
+            }
+        }
+        self.pose = pose.clone();
+        Ok(())
+    }
+
+    /// Moves on to `pose` within `seconds`.
+    ///
+    /// # Errors
+    /// [`AnimationError::Motion`] where a layer cannot be moved.
+    pub fn advance(&mut self, pose: &Pose, seconds: f64) -> Result<(), AnimationError> {
+        let wrong = |e: &dyn std::fmt::Display| AnimationError::Motion(e.to_string());
+        self.warm_up(pose, seconds)?;
+        let moved = self.moved(pose);
+        for (skinner, skin) in self.outfit.skinners.iter().zip(&mut self.skins) {
+            skinner.pose(&moved, self.way, skin).map_err(|e| wrong(&e))?;
+        }
+        for (layer, skin) in self.layers.iter_mut().zip(&self.skins) {
+            layer.clone_from(&skin.positions);
+        }
+        if self.blend == Blend::Anchored {
+            self.finish();
+        }
+        Ok(())
+    }
+
+    /// Presses, rides and settles the skinned layers.
+    fn finish(&mut self) {
+        let outfit = self.outfit;
+        let skin = self.layers[0].clone();
+        let pressed = outfit.columns.press(&skin);
+        pressed.apply_to_body(&mut self.layers[0]);
+        for (k, proxy) in outfit.proxies.iter().enumerate() {
+            let fine = &mut self.layers[k + 1];
+            outfit.columns.apply(&pressed, &skin, k, fine);
+            let moved: Vec<Vector3<f32>> =
+                self.sheets[k].positions.iter().zip(&self.carried[k]).map(|(x, c)| (x - c).cast::<f32>()).collect();
+            proxy.ride.carry(&moved, fine);
+        }
+        self.crossing = outfit.order.settle(&mut self.layers, &mut self.followed);
+    }
+
+    /// Steps that the simulation needs for the way from the last pose to this.
+    fn steps(&self, pose: &Pose) -> usize {
+        let (from, to) = (self.pose.joint_positions(&self.outfit.skeleton), pose.joint_positions(&self.outfit.skeleton));
+        let way = from.iter().zip(&to).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) as f32;
+        ((way / LONGEST_WAY).ceil() as usize).clamp(STEPS.0, STEPS.1)
+    }
+
+    fn moved(&self, pose: &Pose) -> Vec<Isometry3<f64>> {
+        let outfit = self.outfit;
+        let (from, to) = (outfit.pose0.joint_frames(&outfit.skeleton), pose.joint_frames(&outfit.skeleton));
+        to.iter().zip(&from).map(|(to, from)| to * from.inverse()).collect()
+    }
+
+    /// One step of the simulation.
+    fn step(&mut self, pose: &Pose, h: f64) -> Result<(), AnimationError> {
+        let wrong = |e: &dyn std::fmt::Display| AnimationError::Motion(e.to_string());
+        let outfit = self.outfit;
+        let moved = self.moved(pose);
+        outfit.skinners[0].pose(&moved, self.way, &mut self.skins[0]).map_err(|e| wrong(&e))?;
+        let skin = &self.skins[0].positions;
+        let pressed = outfit.columns.press(skin);
+        let mut body = skin.clone();
+        pressed.apply_to_body(&mut body);
+        self.body.move_to(&body);
+        let mut targets = Vec::with_capacity(self.sheets.len());
+        for (proxy, posed) in outfit.proxies.iter().zip(&mut self.proxy_skins) {
+            proxy.skinner.pose(&moved, self.way, posed).map_err(|e| wrong(&e))?;
+            targets.push(target(proxy, posed, &pressed, skin));
+        }
+        // Each layer meets the lower ones where they would be carried.
+        let guesses: Vec<Vec<Vector3<f64>>> = self.sheets.iter().enumerate().map(|(k, s)| self.guess(k, s, &targets[k], h)).collect();
+        let surfaces: Vec<MovingSurface> = self
+            .sheets
+            .par_iter()
+            .zip(&guesses)
+            .map(|(sheet, guess)| {
+                let at = |x: &[Vector3<f64>]| x.iter().map(|p| Point3::from(p.cast::<f32>())).collect::<Vec<_>>();
+                let mut surface = MovingSurface::new(&at(&sheet.positions), sheet.triangles());
+                surface.move_to(&at(guess));
+                surface
+            })
+            .collect();
+        let (body, proxy_skins) = (&self.body, &self.proxy_skins);
+        let results: Vec<Result<(), toile_cloth::ClothError>> = self
+            .sheets
+            .par_iter_mut()
+            .enumerate()
+            .map(|(k, sheet)| {
+                let mut obstacles: Vec<&dyn Obstacle> = vec![body];
+                obstacles.extend(surfaces[..k].iter().map(|s| s as &dyn Obstacle));
+                let around = Surroundings {
+                    pulls: &pulls(&proxy_skins[k].rotations),
+                    anchors: &targets[k],
+                    guess: &guesses[k],
+                    obstacles: &obstacles,
+                    gaps: &outfit.proxies[k].gaps,
+                    drag: DRAG,
+                    ..Surroundings::still()
+                };
+                sheet.advance(h, &around, &Effort { rounds: 1, iterations: 8, tolerance: 2e-5, self_contact: false })
+            })
+            .collect();
+        results.into_iter().collect::<Result<(), _>>().map_err(|e| wrong(&e))?;
+        self.carried = targets;
+        Ok(())
+    }
+
+    /// Where a sheet would be at the end of the step: cloth on the skin with the skin, cloth that hangs free as before.
+    fn guess(&self, k: usize, sheet: &Sheet, target: &[Vector3<f64>], h: f64) -> Vec<Vector3<f64>> {
+        let tied = &self.outfit.proxies[k].tied;
+        let place = |v: usize| {
+            let carried = target[v] - self.carried[k][v];
+            sheet.positions[v] + carried * tied[v] + sheet.velocities[v] * (h * (1.0 - tied[v]))
+        };
+        (0..sheet.len()).map(place).collect()
+    }
+}
+
+/// Skinned and pressed places of a proxy's vertices.
+fn target(
+    proxy: &super::proxy::Proxy,
+    posed: &PosedSkin,
+    pressed: &Pressed,
+    skin: &[Point3<f32>],
+) -> Vec<Vector3<f64>> {
+    let mut places = posed.positions.clone();
+    pressed.apply(skin, &proxy.over, &mut places);
+    places.iter().map(|p| p.coords.cast()).collect()
+}
+
+/// Gravity, less what held the scanned shape against it: that turns with the body, so that cloth hangs as it was scanned
+/// while the body is as it was scanned, and falls to where it must when the body leans.
+fn pulls(rotations: &[UnitQuaternion<f32>]) -> Vec<Vector3<f64>> {
+    let gravity = Vector3::new(0.0, -9.81, 0.0);
+    rotations.iter().map(|r| gravity - r.cast::<f64>() * gravity).collect()
+}

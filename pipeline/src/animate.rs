@@ -1,0 +1,160 @@
+//! Moving layers as files: `SUBJECT/motion/NAME/`, a point cache a layer.
+
+mod caches;
+mod report;
+
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use toile_animation::{
+    blend::{Blend, Outfit, OutfitLayer, Wearer},
+    resample,
+};
+use toile_avatar::Avatar;
+use toile_character::{BodyModel, Motion, Skinning};
+use toile_cloth::Fabric;
+use toile_garments::{ExtractionReport, GarmentType};
+
+use self::{caches::Caches, report::FrameReport};
+pub use self::report::AnimationReport;
+use crate::{
+    Goal, Observer, Options, PipelineError, Run, avatar_choice::AvatarChoice, body_file::Body,
+    garment::Garment, motion, options::MotionChoice, process::process, record, settings, step::Step,
+    steps::{cut::Cut, export}, Record,
+};
+
+/// Expected seconds a frame of a garment.
+const SECONDS: f64 = 0.15;
+/// Seconds over which the layers come from the pose of the scan into the motion's first, and settle there.
+const WARM_UP: (f64, f64) = (1.0, 0.5);
+
+/// How layers are to move.
+#[derive(Debug, Clone)]
+pub struct AnimateOptions {
+    /// The motion.
+    pub motion: MotionChoice,
+    /// Frames a second.
+    pub fps: f64,
+    /// How the layers follow the skeleton.
+    pub blend: Blend,
+    /// How skin weights are blended.
+    pub skinning: Skinning,
+    /// Settings of the stages.
+    pub settings: Option<PathBuf>,
+}
+
+/// What was written.
+#[derive(Debug)]
+pub struct Animated {
+    /// The folder of the motion.
+    pub folder: PathBuf,
+    /// The report, as it is in the folder.
+    pub report: AnimationReport,
+    /// What the operator should know, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Moves the layers of the subject at `root` through a motion and writes their vertices frame by frame; what the avatar lacks
+/// is built first. The caches appear when all are whole.
+///
+/// # Errors
+/// [`PipelineError`] where a stage has no answer or a file cannot be read or written; nothing half-written is left in
+/// the motion's folder.
+pub fn animate(root: &Path, options: &AnimateOptions, observer: &dyn Observer) -> Result<Animated, PipelineError> {
+    let building = Options { settings: options.settings.clone(), ..Options::default() };
+    let summary = process(root, Goal::Avatar, &building, observer)?;
+    let mut warnings = summary.remarks.warnings;
+    let settings = settings::read(Some(root), options.settings.as_deref())?;
+    let run = Run::open(root, None, settings, observer)?;
+    let model = BodyModel::load_default()?;
+    let body = Body::load(&run.folders, run.first_layer(), &model)?;
+    let choice = AvatarChoice::read(&run.folders)?;
+    let garments = garments(&run)?;
+    let avatar = export::Export { run: &run, body: &body, garments: &garments, choice: &choice }.avatar()?;
+    let path = match &options.motion {
+        MotionChoice::AsBefore => choice.motion_path(&run.folders),
+        MotionChoice::Walk => None,
+        MotionChoice::File(path) => Some(path.clone()),
+    };
+    let moved = motion::load(path.as_deref(), &body.skinned, &run.settings.motion)?;
+    warnings.extend(moved.report.warnings.iter().map(|w| format!("motion {}: {w}", moved.motion.name)));
+    let motion = resample(&moved.motion, options.fps);
+    if motion.frame_time * options.fps > 1.01 {
+        let (has, wanted) = (1.0 / motion.frame_time, options.fps);
+        warnings.push(format!("the motion has {has:.1} frames a second; the caches have as many, not {wanted}"));
+    }
+    let folder = run.folders.root.join("motion").join(&motion.name);
+    observer.begin(&run.label("layers", "animate"), SECONDS * (motion.poses.len() * garments.len().max(1)) as f64);
+    let report = bake(&avatar, &garments, &motion, options, &folder, observer)?;
+    observer.end();
+    warnings.extend(report.warnings());
+    Ok(Animated { folder, report, warnings })
+}
+
+/// The garments that the last run stacked.
+fn garments(run: &Run) -> Result<Vec<Garment>, PipelineError> {
+    let mut out = Vec::new();
+    for number in 1..run.layers.len() {
+        let folder = run.folders.layer(&run.layers[number]);
+        let cut: Option<Record<ExtractionReport>> = record::read(&folder, Cut::NAME)?;
+        if let Some(cut) = cut.filter(|_| run.folders.garment(&run.layers[number]).is_file()) {
+            out.push(Garment::new(run, number, &cut.result)?);
+        }
+    }
+    Ok(out)
+}
+
+/// The cloth that a garment of a type is made of, as far as its type says.
+fn fabric(garment: Option<&str>) -> Result<Fabric, toile_cloth::ClothError> {
+    let kind = garment.and_then(|g| g.parse::<GarmentType>().ok());
+    Fabric::named(match kind {
+        Some(GarmentType::Top) => "jersey",
+        Some(GarmentType::Trousers) => "denim",
+        Some(GarmentType::Jacket) => "coating",
+        Some(GarmentType::Shoes | GarmentType::Hat) => "leather",
+        _ => "shirting",
+    })
+}
+
+fn bake(
+    avatar: &Avatar,
+    garments: &[Garment],
+    motion: &Motion,
+    options: &AnimateOptions,
+    folder: &Path,
+    observer: &dyn Observer,
+) -> Result<AnimationReport, PipelineError> {
+    let wrong = |e: &dyn std::fmt::Display| PipelineError::refused(folder, e.to_string());
+    let of_layer = |l: &toile_avatar::AvatarLayer| {
+        let (name, mesh, weights) = (l.name.clone(), l.mesh.clone(), l.weights.clone());
+        Ok(OutfitLayer { name, mesh, weights, fabric: fabric(l.garment.as_deref())? })
+    };
+    let layers: Result<Vec<OutfitLayer>, toile_cloth::ClothError> = avatar.layers.iter().map(of_layer).collect();
+    let layers = layers.map_err(|e| wrong(&e))?;
+    let outfit = Outfit::new(avatar.skeleton.clone(), avatar.pose0.clone(), layers).map_err(|e| wrong(&e))?;
+    let mut wearer = Wearer::new(&outfit, options.blend, options.skinning);
+    let mut report = AnimationReport::new(motion, options, garments);
+    let first = &motion.poses[0];
+    if options.blend != Blend::Skinning {
+        let steps = ((WARM_UP.0 + WARM_UP.1) / motion.frame_time).ceil();
+        for k in 1..=steps as usize {
+            let share = (k as f64 / (steps * WARM_UP.0 / (WARM_UP.0 + WARM_UP.1))).min(1.0);
+            wearer.warm_up(&avatar.pose0.interpolated(first, share), motion.frame_time).map_err(|e| wrong(&e))?;
+        }
+    }
+    let names: Vec<(&str, usize)> = avatar.layers.iter().map(|l| (l.name.as_str(), l.mesh.positions.len())).collect();
+    let mut caches = Caches::begin(folder, &names, motion.poses.len())?;
+    for (k, pose) in motion.poses.iter().enumerate() {
+        let begun = Instant::now();
+        wearer.advance(pose, motion.frame_time).map_err(|e| wrong(&e))?;
+        let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
+        caches.add(wearer.layers())?;
+        report.frames.push(FrameReport::of(&outfit, wearer.layers(), wearer.crossing, milliseconds));
+        observer.at((k + 1) as f32 / motion.poses.len() as f32);
+    }
+    report.sum_up();
+    caches.finish(&report)?;
+    Ok(report)
+}

@@ -1,0 +1,92 @@
+//! What a motion's layers did, frame by frame.
+
+use nalgebra::Point3;
+use rayon::prelude::*;
+use serde::Serialize;
+use toile_animation::blend::{Blend, Outfit};
+use toile_character::Motion;
+use toile_geometry::statistics::{Rank, quantile_by};
+
+use super::AnimateOptions;
+use crate::garment::Garment;
+
+/// `report.json` of a motion.
+#[derive(Debug, Clone, Serialize)]
+pub struct AnimationReport {
+    /// Name of the motion.
+    pub motion: String,
+    /// Frames a second.
+    pub fps: f64,
+    /// How the layers followed the skeleton.
+    pub blend: Blend,
+    /// How skin weights were blended.
+    pub skinning: &'static str,
+    /// Garments, inside to outside.
+    pub garments: Vec<String>,
+    /// Milliseconds a frame: median, and nineteen of twenty are below.
+    pub ms_a_frame: [f64; 2],
+    /// Pairs of triangles of different layers that cross, mean over the frames.
+    pub crossing_mean: f64,
+    /// The frames.
+    pub frames: Vec<FrameReport>,
+}
+
+/// One frame.
+#[derive(Debug, Clone, Serialize)]
+pub struct FrameReport {
+    /// Milliseconds.
+    pub ms: f64,
+    /// Pairs of triangles of different layers that cross.
+    pub crossing: usize,
+    /// Stretch of each layer's edges against the scan that 99 of 100 stay below.
+    pub stretch_p99: Vec<f32>,
+}
+
+impl FrameReport {
+    /// Of the `layers` as they lie now.
+    pub fn of(outfit: &Outfit, layers: &[Vec<Point3<f32>>], crossing: usize, ms: f64) -> Self {
+        let stretch = |(k, now): (usize, &Vec<Point3<f32>>)| {
+            let rest = outfit.scanned(k);
+            let edge = |t: &[u32; 3]| {
+                let [a, b] = [t[0] as usize, t[1] as usize];
+                (now[a] - now[b]).norm() / (rest[a] - rest[b]).norm().max(2e-4)
+            };
+            let mut all: Vec<f32> = outfit.layers()[k].mesh.triangles.iter().map(edge).collect();
+            let place = (all.len() * 99 / 100).min(all.len().saturating_sub(1));
+            if all.is_empty() { 1.0 } else { *all.select_nth_unstable_by(place, f32::total_cmp).1 }
+        };
+        Self { ms, crossing, stretch_p99: layers.par_iter().enumerate().map(stretch).collect() }
+    }
+}
+
+impl AnimationReport {
+    pub(super) fn new(motion: &Motion, options: &AnimateOptions, garments: &[Garment]) -> Self {
+        Self {
+            motion: motion.name.clone(),
+            fps: 1.0 / motion.frame_time,
+            blend: options.blend,
+            skinning: options.skinning.name(),
+            garments: garments.iter().map(|g| g.layer.clone()).collect(),
+            ms_a_frame: [0.0; 2],
+            crossing_mean: 0.0,
+            frames: Vec::with_capacity(motion.poses.len()),
+        }
+    }
+
+    pub(super) fn sum_up(&mut self) {
+        let mut times: Vec<f64> = self.frames.iter().map(|f| f.ms).collect();
+        self.ms_a_frame = [0.5, 0.95].map(|q| quantile_by(&mut times, q, Rank::Count).unwrap_or(0.0));
+        let crossing: usize = self.frames.iter().map(|f| f.crossing).sum();
+        self.crossing_mean = crossing as f64 / self.frames.len().max(1) as f64;
+    }
+
+    /// Sentences for the operator.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let crossing = self.frames.iter().filter(|f| f.crossing > 0).count();
+        if crossing == 0 || self.blend == Blend::Skinning {
+            return Vec::new();
+        }
+        let (frames, mean) = (self.frames.len(), self.crossing_mean);
+        vec![format!("layers cross in {crossing} of {frames} frames, {mean:.1} pairs of triangles a frame on average")]
+    }
+}

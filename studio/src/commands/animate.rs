@@ -1,0 +1,105 @@
+//! `toile animate`: the layers in motion, as point caches.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+use toile_capture::printable_path;
+use toile_character::Skinning;
+use toile_pipeline::{AnimateOptions, Animated, Blend, animate};
+
+use crate::{
+    StudioError,
+    commands::reach::{motion_choice, must_exist},
+    outcome::Answer,
+    session::Session,
+};
+
+const AFTER: &str = "\
+Writes SUBJECT/motion/NAME/: a point cache (PC2, metres, +Y up, vertices in the order of avatar.glb) for the body and each
+garment, and report.json. Blender shows them with the modifier Mesh Cache on the meshes of avatar.glb.
+
+Cloth that lies on the body follows it, cloth that hangs swings, and layers are kept apart in every frame. What the avatar
+lacks is built first.
+
+Examples:
+  toile animate anna
+  toile animate anna --motion dance.bvh --fps 60
+  toile animate anna --blend skinning";
+
+/// Move the layers through a motion: skinning and cloth, as point caches
+#[derive(Debug, clap::Args)]
+#[command(after_help = AFTER)]
+pub struct Animate {
+    /// The subject
+    subject: PathBuf,
+    /// Motion (BVH, or GLB or VRMA with an animation), or `walk` for the one that ships with Toile (without: the avatar's)
+    #[arg(long, value_name = "FILE")]
+    motion: Option<PathBuf>,
+    /// Frames a second, at most those of the motion
+    #[arg(long, default_value_t = 30.0, value_parser = rate)]
+    fps: f64,
+    /// By skin weights alone, or with cloth where it hangs
+    #[arg(long, value_enum, default_value_t = Way::Anchored)]
+    blend: Way,
+    /// How skin weights are blended
+    #[arg(long, value_enum, default_value_t = Weights::Linear)]
+    skinning: Weights,
+    /// Settings of the stages; they win over those of SUBJECT/toile.toml
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Way {
+    Skinning,
+    Anchored,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Weights {
+    Linear,
+    Log,
+    Hybrid,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(fps) if (1.0..=480.0).contains(&fps) => Ok(fps),
+        _ => Err("frames a second must be a number from 1 to 480".into()),
+    }
+}
+
+impl Animate {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// [`StudioError`] where a stage has no answer or files cannot be read or written.
+    pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        must_exist(&self.subject)?;
+        let options = AnimateOptions {
+            motion: motion_choice(self.motion.as_deref()),
+            fps: self.fps,
+            blend: match self.blend {
+                Way::Skinning => Blend::Skinning,
+                Way::Anchored => Blend::Anchored,
+            },
+            skinning: match self.skinning {
+                Weights::Linear => Skinning::Linear,
+                Weights::Log => Skinning::Log,
+                Weights::Hybrid => Skinning::Hybrid,
+            },
+            settings: self.settings.clone(),
+        };
+        let Animated { folder, report, warnings } = animate(&self.subject, &options, session.progress.as_ref())?;
+        let text = format!(
+            "{}\n{} frames, {:.0} ms a frame (95 %: {:.0} ms), {:.1} pairs of triangles cross on average\n",
+            printable_path(&folder),
+            report.frames.len(),
+            report.ms_a_frame[0],
+            report.ms_a_frame[1],
+            report.crossing_mean,
+        );
+        let results = json!({ "folder": printable_path(&folder), "report": report });
+        Ok(Answer { text, results, warnings, ..Answer::default() })
+    }
+}
