@@ -7,17 +7,15 @@
 //!    side are pressed together in their order, and the body gives way where even that is not enough ([`squeeze`]);
 //! 3. a proxy of each garment is simulated, tied to the skinned place by springs that are the stiffer the closer the
 //!    cloth lies to the body ([`anchors`], [`proxy`]), and the scanned mesh rides on it ([`ride`]);
-//! 4. layers that still come through each other are set right at full resolution, from inside to outside ([`order`]).
 //!
-//! [`Blend::Skinning`] ends after the first step.
+//! [`Blend::Skinning`] ends after the first step. Whoever keeps the layers apart at full resolution afterwards tells the wearer
+//! where they came to lie ([`Wearer::correct`]): the next frame starts from there.
 
 mod anchors;
-mod order;
 mod outfit;
 mod proxy;
 mod ride;
 mod squeeze;
-mod tracker;
 mod wearer;
 
 pub use outfit::{Outfit, OutfitLayer};

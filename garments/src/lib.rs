@@ -52,6 +52,7 @@ pub use report::{ExtractionReport, Warning};
 pub use settings::{CullSettings, ExtractSettings, Labelling, StackMethod, StackSettings};
 pub use skin::{common_frame::weights as weights_from_body, hanging::mark_free, layer_weights::carry_weights};
 pub use stack::{
+    Apart,
     report::{GAP_BINS_MM, LayerReport, StackReport},
     stack,
 };

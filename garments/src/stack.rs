@@ -11,6 +11,7 @@
 //!
 //! The seed's own way, one push along the normal, is [`push_out`].
 
+mod apart;
 mod contact;
 mod contacts;
 mod cut_rest;
@@ -26,8 +27,12 @@ mod swept;
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-use toile_geometry::{Mesh, intersection::self_crossings};
+use toile_geometry::{
+    Mesh,
+    intersection::{self_crossings, self_crossings_among},
+};
 
+pub use self::apart::Apart;
 use self::{
     contact::Contact,
     contacts::Contacts,
@@ -43,8 +48,19 @@ use crate::{
     settings::{StackMethod, StackSettings},
 };
 
-/// Limit of the times that all layers are looked at.
+/// Limit of the times that all layers are looked at, for a result that stays.
 const PASSES: usize = 6;
+/// The same for one frame of many.
+const FRAME_PASSES: usize = 3;
+
+/// How much work is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Care {
+    /// A result that stays: believed only after everything was looked at afresh.
+    Lasting,
+    /// One frame of many.
+    Frame,
+}
 
 /// Moves the `layers` (inside to outside, in the pose of `body`) so that each lies outside the body and all layers
 /// below it, by a gap that grows with its `thickness` (metres, one for each layer; a scan shows the outer side of cloth):
@@ -67,7 +83,7 @@ pub fn stack(
     let mut worn: Vec<Layer> = meshes.into_par_iter().map(|(mesh, gap)| Layer::new(mesh, gap)).collect();
     let own_before = own_crossings(&worn);
     let (rounds, left) = match settings.method {
-        StackMethod::Regions => settle(&mut worn, &own_before, settings, progress),
+        StackMethod::Regions => settle(&mut worn, &own_before, settings, Care::Lasting, progress),
         StackMethod::PushAlongNormal => {
             push_along_normals(&mut worn, settings);
             (1, too_near(&mut Contacts::new(&worn), &worn, settings))
@@ -126,15 +142,17 @@ fn settle(
     layers: &mut [Layer],
     own_before: &[Vec<[u32; 2]>],
     settings: &StackSettings,
+    care: Care,
     progress: &(dyn Fn(f32) + Sync),
 ) -> (usize, Vec<Contact>) {
     let mut contacts = Contacts::new(layers);
     let mut own = own_before.to_vec();
     let (mut rounds, mut fresh) = (0, true);
-    for pass in 0..PASSES {
+    let passes = if care == Care::Frame { FRAME_PASSES } else { PASSES };
+    for pass in 0..passes {
         let left = too_near(&mut contacts, layers, settings);
         let regions = regions(left.iter().map(|c| place(layers, c)).chain(tangled(layers, &own)));
-        if regions.is_empty() && fresh {
+        if regions.is_empty() && (fresh || care == Care::Frame) {
             return (rounds, left);
         }
         if regions.is_empty() {
@@ -146,14 +164,17 @@ fn settle(
         let solved: Vec<(Vec<Moved>, usize)> = regions.par_iter().map(|r| part(r, layers, settings)).collect();
         rounds = solved.iter().map(|s| s.1).fold(rounds, usize::max);
         let still = solved.iter().all(|s| s.0.is_empty());
-        apply(layers, solved, &regions, &mut contacts, settings);
-        own = own_crossings(layers);
-        progress((pass + 1) as f32 / PASSES as f32);
+        let moved = apply(layers, solved, &regions, &mut contacts, settings);
+        own = own_crossings_after(layers, &own, &moved);
+        progress((pass + 1) as f32 / passes as f32);
         if still {
             break;
         }
     }
-    (rounds, too_near(&mut Contacts::new(layers), layers, settings))
+    if care == Care::Lasting {
+        contacts = Contacts::new(layers);
+    }
+    (rounds, too_near(&mut contacts, layers, settings))
 }
 
 /// Where a contact is.
@@ -173,14 +194,14 @@ fn too_near(contacts: &mut Contacts, layers: &[Layer], settings: &StackSettings)
     left
 }
 
-/// Puts vertices where they were moved to.
+/// Puts vertices where they were moved to. Returns how far each one went, by layer; empty for layers that stayed.
 fn apply(
     layers: &mut [Layer],
     solved: Vec<(Vec<Moved>, usize)>,
     regions: &[Region],
     contacts: &mut Contacts,
     settings: &StackSettings,
-) {
+) -> Vec<Vec<f32>> {
     let mut moved = vec![Vec::new(); layers.len()];
     for (k, v, to) in solved.into_iter().flat_map(|s| s.0) {
         if moved[k].is_empty() {
@@ -192,12 +213,30 @@ fn apply(
     }
     layers.par_iter_mut().zip(&moved).filter(|(_, m)| !m.is_empty()).for_each(|(layer, _)| layer.surface.refresh());
     contacts.moved_in(regions, &moved, layers, settings.reach);
+    moved
 }
 
 /// Pairs of triangles of each layer that cross within it; the body's are not looked for.
 fn own_crossings(layers: &[Layer]) -> Vec<Vec<[u32; 2]>> {
     let of = |(k, layer): (usize, &Layer)| {
         if k == 0 { Vec::new() } else { self_crossings(layer.mesh(), &layer.surface.bvh) }
+    };
+    layers.par_iter().enumerate().map(of).collect()
+}
+
+/// As [`own_crossings`], where `before` holds what crossed until the vertices `moved`.
+fn own_crossings_after(layers: &[Layer], before: &[Vec<[u32; 2]>], moved: &[Vec<f32>]) -> Vec<Vec<[u32; 2]>> {
+    let of = |(k, layer): (usize, &Layer)| {
+        if k == 0 || moved[k].is_empty() {
+            return before[k].clone();
+        }
+        let mesh = layer.mesh();
+        let went = |t: u32| mesh.triangles[t as usize].iter().any(|&v| moved[k][v as usize] > 0.0);
+        let some: Vec<u32> = (0..mesh.triangles.len() as u32).filter(|&t| went(t)).collect();
+        let mut pairs: Vec<[u32; 2]> = before[k].iter().copied().filter(|p| !p.iter().any(|&t| went(t))).collect();
+        pairs.extend(self_crossings_among(mesh, &some, &layer.surface.bvh));
+        pairs.sort_unstable();
+        pairs
     };
     layers.par_iter().enumerate().map(of).collect()
 }

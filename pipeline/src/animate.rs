@@ -15,14 +15,21 @@ use toile_animation::{
 use toile_avatar::Avatar;
 use toile_character::{BodyModel, Motion, Skinning};
 use toile_cloth::Fabric;
-use toile_garments::{ExtractionReport, GarmentType};
+use toile_garments::{Apart, ExtractionReport, GarmentType};
 
-use self::{caches::Caches, report::FrameReport};
 pub use self::report::AnimationReport;
+use self::{caches::Caches, report::FrameReport};
 use crate::{
-    Goal, Observer, Options, PipelineError, Run, avatar_choice::AvatarChoice, body_file::Body,
-    garment::Garment, motion, options::MotionChoice, process::process, record, settings, step::Step,
-    steps::{cut::Cut, export}, Record,
+    Goal, Observer, Options, PipelineError, Record, Run,
+    avatar_choice::AvatarChoice,
+    body_file::Body,
+    garment::Garment,
+    motion,
+    options::MotionChoice,
+    process::process,
+    record, settings,
+    step::Step,
+    steps::{cut::Cut, export},
 };
 
 /// Expected seconds a frame of a garment.
@@ -146,12 +153,19 @@ fn bake(
     }
     let names: Vec<(&str, usize)> = avatar.layers.iter().map(|l| (l.name.as_str(), l.mesh.positions.len())).collect();
     let mut caches = Caches::begin(folder, &names, motion.poses.len())?;
+    let mut apart = Apart::new(&avatar.layers.iter().map(|l| &l.mesh).collect::<Vec<_>>());
     for (k, pose) in motion.poses.iter().enumerate() {
         let begun = Instant::now();
         wearer.advance(pose, motion.frame_time).map_err(|e| wrong(&e))?;
+        let mut crossing = 0;
+        if options.blend != Blend::Skinning {
+            let mut layers = wearer.layers().to_vec();
+            crossing = apart.keep(&mut layers);
+            wearer.correct(&layers).map_err(|e| wrong(&e))?;
+        }
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
         caches.add(wearer.layers())?;
-        report.frames.push(FrameReport::of(&outfit, wearer.layers(), wearer.crossing, milliseconds));
+        report.frames.push(FrameReport::of(&outfit, wearer.layers(), crossing, milliseconds));
         observer.at((k + 1) as f32 / motion.poses.len() as f32);
     }
     report.sum_up();

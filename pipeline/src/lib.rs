@@ -57,5 +57,5 @@ pub use run::Run;
 pub use scan_survey::ScanSurvey;
 pub use settings::Settings;
 pub use step::{Product, Remarks, Step};
-pub use toile_animation::blend::Blend;
 pub use summary::{Decided, Measured, Summary, TakeSummary};
+pub use toile_animation::blend::Blend;

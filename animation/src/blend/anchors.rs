@@ -12,7 +12,7 @@ const TIGHT: f64 = 150.0;
 /// Frequency of cloth that hangs free, rad/s.
 const LOOSE: f64 = 4.0;
 /// Distance from the skin up to which cloth lies on it, metres: twice the deepest fold of a knitted garment that is worn close.
-const NEAR: f64 = 0.008;
+const NEAR: f64 = 0.015;
 /// Distance from which cloth hangs free, metres: half the width of a trouser leg over a shin.
 const FAR: f64 = 0.06;
 

@@ -6,7 +6,7 @@ use toile_character::{Pose, Skeleton, SkinWeights, Skinner};
 use toile_cloth::Fabric;
 use toile_geometry::Mesh;
 
-use super::{anchors::Closeness, order::Order, proxy::Proxy, squeeze::Columns};
+use super::{anchors::Closeness, proxy::Proxy, squeeze::Columns};
 use crate::AnimationError;
 
 /// A layer of an outfit: the body, or a garment.
@@ -31,7 +31,6 @@ pub struct Outfit {
     /// One for each garment.
     pub(super) proxies: Vec<Proxy>,
     pub(super) columns: Columns,
-    pub(super) order: Order,
 }
 
 impl Outfit {
@@ -52,8 +51,8 @@ impl Outfit {
         let proxies: Result<Vec<Proxy>, AnimationError> =
             layers[1..].par_iter().map(|layer| Proxy::new(layer, &closeness)).collect();
         let meshes: Vec<&Mesh> = layers.iter().map(|l| &l.mesh).collect();
-        let (columns, order) = (Columns::new(&meshes, &closeness), Order::new(&meshes));
-        Ok(Self { skeleton, pose0, proxies: proxies?, columns, order, skinners, layers })
+        let columns = Columns::new(&meshes, &closeness);
+        Ok(Self { skeleton, pose0, proxies: proxies?, columns, skinners, layers })
     }
 
     /// The layers in the outfit's first pose.

@@ -1,7 +1,7 @@
 //! The sheet that is simulated in place of a garment's mesh.
 
 use nalgebra::{Point3, Vector3};
-use toile_character::{SkinWeights, Skinner, FREE_PART};
+use toile_character::{FREE_PART, SkinWeights, Skinner};
 use toile_cloth::{Anchors, Sheet};
 use toile_geometry::{Mesh, bvh::Bvh, remesh};
 
@@ -23,7 +23,6 @@ const GAP: f64 = 0.002;
 pub(crate) struct Proxy {
     pub sheet: Sheet,
     pub skinner: Skinner,
-    pub mesh: Mesh,
     pub over: Vec<Over>,
     /// Distance that each vertex keeps from surfaces, metres.
     pub gaps: Vec<f64>,
@@ -52,7 +51,7 @@ impl Proxy {
         let gaps = (0..over.len()).map(|v| distance(v).min(GAP)).collect();
         let skinner = Skinner::new(&mesh, &weights).map_err(|e| wrong(e.to_string()))?;
         let ride = Ride::new(&layer.mesh, &mesh);
-        Ok(Self { sheet, skinner, mesh, over, gaps, tied, ride })
+        Ok(Self { sheet, skinner, over, gaps, tied, ride })
     }
 }
 

@@ -11,18 +11,18 @@ use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals, topology::VertexNeigh
 
 use super::anchors::{Closeness, Over};
 
-/// Farthest that another part of the body is looked for above the skin, metres: twice the height of a thick coat's sleeve.
-const REACH: f32 = 0.16;
 /// Deepest that another part of the body is looked for below the skin, metres.
 const DEPTH: f32 = 0.05;
 /// Thinnest that a layer can be pressed, metres.
-const THINNEST: f32 = 0.0008;
+const THINNEST: f32 = 0.0015;
 /// Room left between what belongs to either side, metres.
-const MARGIN: f32 = 0.0005;
+const MARGIN: f32 = 0.0020;
 /// Cloth above this height does not stand in the column, metres: it hangs free.
-const TALLEST: f32 = 0.06;
+const TALLEST: f32 = 0.15;
 /// Rounds of smoothing over the body's vertices.
-const SMOOTHINGS: usize = 6;
+const SMOOTHINGS: usize = 12;
+/// Rings of vertices by which the excess of a column spreads before that.
+const WIDENINGS: usize = 4;
 
 /// The columns over the body.
 pub(crate) struct Columns {
@@ -32,8 +32,8 @@ pub(crate) struct Columns {
     depths: Vec<f32>,
     /// Height of the topmost layer over each vertex in the outfit's first pose, metres.
     tops: Vec<f32>,
-    /// Layers over each vertex.
-    counts: Vec<f32>,
+    /// For each garment, which of the layers over each vertex it is, from 1; the last tells how many there are.
+    ranks: Vec<Vec<f32>>,
     /// Where the vertices of each garment's mesh stand.
     over: Vec<Vec<Over>>,
 }
@@ -42,7 +42,9 @@ pub(crate) struct Columns {
 pub(crate) struct Pressed {
     /// Height of the skin, metres: 0 or below.
     floor: Vec<f32>,
-    /// Height above the skin over the height before, at most 1.
+    /// Least height of a layer over the one below, metres; 0 where nothing is pressed.
+    step: Vec<f32>,
+    /// What is left of the height beside that, at most 1.
     share: Vec<f32>,
     normals: Vec<Vector3<f32>>,
 }
@@ -52,8 +54,9 @@ impl Columns {
         let body = layers[0];
         let n = body.positions.len();
         let neighbours = VertexNeighbors::new(n, &body.triangles);
-        let (mut tops, mut counts) = (vec![0.0f32; n], vec![0.0f32; n]);
-        let mut over = Vec::new();
+        let mut tops = vec![0.0f32; n];
+        let mut rank = vec![0.0f32; n];
+        let (mut over, mut ranks) = (Vec::new(), Vec::new());
         for layer in &layers[1..] {
             let places: Vec<Over> = layer.positions.par_iter().filter_map(|p| closeness.over(p)).collect();
             let mut covered = vec![0.0f32; n];
@@ -63,15 +66,18 @@ impl Columns {
                     covered[v as usize] = 1.0;
                 }
             }
-            counts.iter_mut().zip(covered).for_each(|(c, one)| *c += one);
+            for _ in 0..3 {
+                covered = widened(&covered, &neighbours);
+            }
+            rank.iter_mut().zip(smoothed(&covered, &neighbours, 3)).for_each(|(r, one)| *r += one);
+            ranks.push(rank.clone());
             over.push(places);
         }
         for _ in 0..3 {
             tops = widened(&tops, &neighbours);
-            counts = widened(&counts, &neighbours);
         }
-        let (tops, counts) = (smoothed(&tops, &neighbours, 3), smoothed(&counts, &neighbours, 3));
-        Self { triangles: body.triangles.clone(), neighbours, depths: depths(body), tops, counts, over }
+        let tops = smoothed(&tops, &neighbours, 3);
+        Self { triangles: body.triangles.clone(), neighbours, depths: depths(body), tops, ranks, over }
     }
 
     /// How the columns are pressed where the body stands at `body`.
@@ -79,36 +85,52 @@ impl Columns {
         let normals = vertex_normals(body, &self.triangles);
         let bvh = Bvh::new(body, &self.triangles);
         let faces: Vec<Vector3<f32>> = toile_geometry::mesh::triangle_normals(body, &self.triangles);
-        let room = |v: usize| {
+        // How much taller each column is than the room that it has.
+        let excess = |v: usize| {
             let (n, depth) = (normals[v], self.depths[v]);
             let origin = body[v] - n * depth;
             let faces_us = |t: u32| faces[t as usize].dot(&n) < 0.0;
-            let hit = bvh.ray_where(&origin, &n, depth + REACH, faces_us);
-            hit.map_or(REACH / 2.0, |h| (h.t - depth) / 2.0)
+            let hit = bvh.ray_where(&origin, &n, depth + 2.0 * self.tops[v] + 2.0 * MARGIN, faces_us);
+            hit.map_or(0.0, |h| (self.tops[v] + MARGIN - (h.t - depth) / 2.0).max(0.0))
         };
-        let room: Vec<f32> = (0..body.len()).into_par_iter().map(room).collect();
-        // The nearest of the neighbours' too, so that no column stands taller than the one beside it can.
-        let room = widened(&room.iter().map(|r| -r).collect::<Vec<_>>(), &self.neighbours);
-        let room: Vec<f32> = smoothed(&room, &self.neighbours, SMOOTHINGS).iter().map(|r| -r).collect();
-        let mut floor = vec![0.0f32; body.len()];
-        let mut share = vec![1.0f32; body.len()];
-        for v in 0..body.len() {
-            let (room, top) = (room[v] - MARGIN, self.tops[v]);
-            if room >= top {
-                continue;
-            }
-            let thinnest = (self.counts[v] * THINNEST).min(top);
-            floor[v] = (room - thinnest).min(0.0);
-            share[v] = if top > 1e-6 { ((room - floor[v]) / top).clamp(0.02, 1.0) } else { 1.0 };
+        let excess: Vec<f32> = (0..body.len()).into_par_iter().map(excess).collect();
+        // Wider than the smoothing reaches, so that it takes nothing off where two parts meet.
+        let excess = (0..WIDENINGS).fold(excess, |excess, _| widened(&excess, &self.neighbours));
+        let excess = smoothed(&excess, &self.neighbours, SMOOTHINGS);
+        let mut pressed = Pressed {
+            floor: vec![0.0; body.len()],
+            step: vec![0.0; body.len()],
+            share: vec![1.0; body.len()],
+            normals,
+        };
+        for (v, excess) in excess.iter().enumerate().filter(|(_, e)| **e > 1e-6) {
+            let (top, count) = (self.tops[v], self.ranks.last().map_or(0.0, |r| r[v]));
+            let room = top - excess;
+            // Slowly at first, so that layers with room are not moved.
+            let step = THINNEST * (excess / (THINNEST * count.max(1.0))).min(1.0);
+            pressed.step[v] = step;
+            pressed.floor[v] = (room - step * count).min(0.0);
+            let left = room - pressed.floor[v] - step * count;
+            pressed.share[v] = if top > 1e-6 { (left / top).clamp(0.0, 1.0) } else { 0.0 };
         }
-        let floor = smoothed(&floor, &self.neighbours, SMOOTHINGS);
-        let share = smoothed(&share, &self.neighbours, SMOOTHINGS);
-        Pressed { floor, share, normals }
+        pressed
+    }
+
+    /// Presses vertices of garment `k` that stand `over` places of the skin.
+    pub fn apply_over(
+        &self,
+        pressed: &Pressed,
+        body: &[Point3<f32>],
+        k: usize,
+        over: &[Over],
+        positions: &mut [Point3<f32>],
+    ) {
+        pressed.apply(body, over, &self.ranks[k], positions);
     }
 
     /// Presses the vertices of garment `k`'s mesh.
     pub fn apply(&self, pressed: &Pressed, body: &[Point3<f32>], k: usize, positions: &mut [Point3<f32>]) {
-        pressed.apply(body, &self.over[k], positions);
+        pressed.apply(body, &self.over[k], &self.ranks[k], positions);
     }
 }
 
@@ -118,14 +140,15 @@ impl Pressed {
         body.iter_mut().enumerate().for_each(|(v, p)| *p += self.normals[v] * self.floor[v]);
     }
 
-    /// Presses vertices that stand `over` places of the skin, which was at `body` before it was pressed.
-    pub fn apply(&self, body: &[Point3<f32>], over: &[Over], positions: &mut [Point3<f32>]) {
+    /// Presses vertices of a garment of these `ranks` that stand `over` places of the skin, which was at `body` before it was
+    /// pressed.
+    fn apply(&self, body: &[Point3<f32>], over: &[Over], ranks: &[f32], positions: &mut [Point3<f32>]) {
         positions.par_iter_mut().zip(over).for_each(|(p, over)| {
             let mix = |values: &[f32]| -> f32 {
                 over.corners.iter().zip(over.barycentric).map(|(&v, w)| values[v as usize] * w).sum()
             };
-            let (floor, share) = (mix(&self.floor), mix(&self.share));
-            if floor == 0.0 && share == 1.0 {
+            let (floor, step, share) = (mix(&self.floor), mix(&self.step), mix(&self.share));
+            if step == 0.0 {
                 return;
             }
             let at = |k: usize| over.corners[k] as usize;
@@ -133,7 +156,7 @@ impl Pressed {
             let Some(normal) = normal.try_normalize(1e-6) else { return };
             let skin: Vector3<f32> = (0..3).map(|k| body[at(k)].coords * over.barycentric[k]).sum();
             let height = (p.coords - skin).dot(&normal);
-            *p += normal * (floor + height * share - height);
+            *p += normal * (floor + mix(ranks) * step + height * share - height);
         });
     }
 }

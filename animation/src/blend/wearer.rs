@@ -5,12 +5,7 @@ use rayon::prelude::*;
 use toile_character::{Pose, PosedSkin, Skinning};
 use toile_cloth::{Effort, MovingSurface, Obstacle, Sheet, Surroundings};
 
-use super::{
-    Blend,
-    order::Followed,
-    outfit::Outfit,
-    squeeze::Pressed,
-};
+use super::{Blend, outfit::Outfit};
 use crate::AnimationError;
 
 /// Farthest that the body may move in one step of the simulation, metres: the reach of contact is twice that.
@@ -19,6 +14,8 @@ const LONGEST_WAY: f32 = 0.015;
 const STEPS: (usize, usize) = (2, 6);
 /// Rate at which the air and the layers below damp cloth that moves against the body, 1/s.
 const DRAG: f64 = 4.0;
+/// Time in which corrections fade, seconds: a step and a half of a walk.
+const FORGET: f64 = 1.5;
 
 /// An outfit in motion: give it pose after pose.
 pub struct Wearer<'a> {
@@ -30,12 +27,11 @@ pub struct Wearer<'a> {
     /// Skinned and pressed places of the proxies at the end of the last step.
     carried: Vec<Vec<Vector3<f64>>>,
     body: MovingSurface,
-    followed: Followed,
+    /// Where the vertices of each garment were moved to beside where cloth and skin take them, in their local frames.
+    corrections: Vec<Vec<Vector3<f32>>>,
     skins: Vec<PosedSkin>,
     proxy_skins: Vec<PosedSkin>,
     layers: Vec<Vec<Point3<f32>>>,
-    /// Pairs of triangles of different layers that crossed in the last frame, as far as they could not be moved apart.
-    pub crossing: usize,
 }
 
 impl<'a> Wearer<'a> {
@@ -50,11 +46,10 @@ impl<'a> Wearer<'a> {
             carried: sheets.iter().map(|s| s.positions.clone()).collect(),
             sheets,
             body: MovingSurface::new(&layers[0], &outfit.layers[0].mesh.triangles),
-            followed: outfit.order.start(),
-            skins: layers.iter().map(|_| PosedSkin::default()).collect(),
+            corrections: layers[1..].iter().map(|l| vec![Vector3::zeros(); l.len()]).collect(),
+            skins: layers.iter().map(|_| PosedSkin::with_frames()).collect(),
             proxy_skins: outfit.proxies.iter().map(|_| PosedSkin::with_frames()).collect(),
             layers,
-            crossing: 0,
             outfit,
         }
     }
@@ -95,13 +90,13 @@ impl<'a> Wearer<'a> {
             layer.clone_from(&skin.positions);
         }
         if self.blend == Blend::Anchored {
-            self.finish();
+            self.finish(seconds);
         }
         Ok(())
     }
 
-    /// Presses, rides and settles the skinned layers.
-    fn finish(&mut self) {
+    /// Presses the skinned layers and lets them ride on the cloth, from where they were corrected to last.
+    fn finish(&mut self, seconds: f64) {
         let outfit = self.outfit;
         let skin = self.layers[0].clone();
         let pressed = outfit.columns.press(&skin);
@@ -112,13 +107,40 @@ impl<'a> Wearer<'a> {
             let moved: Vec<Vector3<f32>> =
                 self.sheets[k].positions.iter().zip(&self.carried[k]).map(|(x, c)| (x - c).cast::<f32>()).collect();
             proxy.ride.carry(&moved, fine);
+            let kept = (-seconds / FORGET).exp() as f32;
+            let turns = &self.skins[k + 1].rotations;
+            let corrections = &mut self.corrections[k];
+            fine.par_iter_mut().zip(corrections).zip(turns).for_each(|((p, c), turn)| {
+                *c *= kept;
+                *p += turn * *c;
+            });
         }
-        self.crossing = outfit.order.settle(&mut self.layers, &mut self.followed);
+    }
+
+    /// Takes over where the layers were moved to after the last frame, to keep them apart: the next frame starts from there.
+    ///
+    /// # Errors
+    /// [`AnimationError::Motion`] where they are not the layers of this outfit.
+    pub fn correct(&mut self, layers: &[Vec<Point3<f32>>]) -> Result<(), AnimationError> {
+        let same =
+            layers.len() == self.layers.len() && layers.iter().zip(&self.layers).all(|(a, b)| a.len() == b.len());
+        if !same {
+            return Err(AnimationError::Motion("the corrected layers are not those of the outfit".into()));
+        }
+        for (k, corrections) in self.corrections.iter_mut().enumerate() {
+            let turns = &self.skins[k + 1].rotations;
+            for (v, correction) in corrections.iter_mut().enumerate() {
+                *correction += turns[v].inverse() * (layers[k + 1][v] - self.layers[k + 1][v]);
+            }
+        }
+        self.layers.iter_mut().zip(layers).for_each(|(own, new)| own.clone_from(new));
+        Ok(())
     }
 
     /// Steps that the simulation needs for the way from the last pose to this.
     fn steps(&self, pose: &Pose) -> usize {
-        let (from, to) = (self.pose.joint_positions(&self.outfit.skeleton), pose.joint_positions(&self.outfit.skeleton));
+        let (from, to) =
+            (self.pose.joint_positions(&self.outfit.skeleton), pose.joint_positions(&self.outfit.skeleton));
         let way = from.iter().zip(&to).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) as f32;
         ((way / LONGEST_WAY).ceil() as usize).clamp(STEPS.0, STEPS.1)
     }
@@ -140,13 +162,16 @@ impl<'a> Wearer<'a> {
         let mut body = skin.clone();
         pressed.apply_to_body(&mut body);
         self.body.move_to(&body);
-        let mut targets = Vec::with_capacity(self.sheets.len());
-        for (proxy, posed) in outfit.proxies.iter().zip(&mut self.proxy_skins) {
+        let mut targets: Vec<Vec<Vector3<f64>>> = Vec::with_capacity(self.sheets.len());
+        for (k, (proxy, posed)) in outfit.proxies.iter().zip(&mut self.proxy_skins).enumerate() {
             proxy.skinner.pose(&moved, self.way, posed).map_err(|e| wrong(&e))?;
-            targets.push(target(proxy, posed, &pressed, skin));
+            let mut places = posed.positions.clone();
+            outfit.columns.apply_over(&pressed, skin, k, &proxy.over, &mut places);
+            targets.push(places.iter().map(|p| p.coords.cast()).collect());
         }
         // Each layer meets the lower ones where they would be carried.
-        let guesses: Vec<Vec<Vector3<f64>>> = self.sheets.iter().enumerate().map(|(k, s)| self.guess(k, s, &targets[k], h)).collect();
+        let guesses: Vec<Vec<Vector3<f64>>> =
+            self.sheets.iter().enumerate().map(|(k, s)| self.guess(k, s, &targets[k], h)).collect();
         let surfaces: Vec<MovingSurface> = self
             .sheets
             .par_iter()
@@ -192,18 +217,6 @@ impl<'a> Wearer<'a> {
         };
         (0..sheet.len()).map(place).collect()
     }
-}
-
-/// Skinned and pressed places of a proxy's vertices.
-fn target(
-    proxy: &super::proxy::Proxy,
-    posed: &PosedSkin,
-    pressed: &Pressed,
-    skin: &[Point3<f32>],
-) -> Vec<Vector3<f64>> {
-    let mut places = posed.positions.clone();
-    pressed.apply(skin, &proxy.over, &mut places);
-    places.iter().map(|p| p.coords.cast()).collect()
 }
 
 /// Gravity, less what held the scanned shape against it: that turns with the body, so that cloth hangs as it was scanned
