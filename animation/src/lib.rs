@@ -3,6 +3,7 @@
 //! - [`bvh`]: motion files read and written;
 //! - [`retarget`]: any of the usual skeletons carried onto the target's 52 joints;
 //! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
+//! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
 //! - [`resample`], [`close_loop`]: other rates, endless motions.
 //!
 //! ```
@@ -19,6 +20,7 @@
 //! Poses are relative to the A-pose rest of the person; +Y up, +Z the front; metres, radians, seconds.
 
 pub mod bvh;
+pub mod decomposition;
 mod error;
 mod retarget;
 mod skeleton;
