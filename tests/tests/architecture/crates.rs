@@ -27,7 +27,7 @@ const TABLE: &[Row] = &[
     row("fitting", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("garments", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("animation", &["geometry", "character"], &["outside"]),
-    row("avatar", &["geometry", "character"], &[]),
+    row("avatar", &["geometry", "character"], &["animation", "outside"]),
     row("render", &["geometry"], &[]),
     row("synthetic", &["geometry", "capture", "character", "render"], &[]),
     row("driver-transport", &[], &["outside"]),
