@@ -26,8 +26,7 @@ pub(super) struct Sampled {
 
 impl Sampled {
     pub fn new(layer: &LayerMotion<'_>, joints: &[Vec<Isometry3<f64>>]) -> Self {
-        let (count, total) = (layer.rest.len().min(MOST_VERTICES), layer.rest.len());
-        let vertices: Vec<u32> = (0..count).map(|k| (k * total / count) as u32).collect();
+        let vertices = drawn(layer.rest.len(), MOST_VERTICES);
         let of =
             |points: &[Point3<f32>]| vertices.iter().map(|&v| points[v as usize].cast::<f64>()).collect::<Vec<_>>();
         let frames: Vec<Vec<Point3<f64>>> = layer.frames.par_iter().map(|frame| of(frame)).collect();
@@ -79,5 +78,49 @@ impl Weighted {
     /// The sampled ones of a frame's `positions`.
     pub fn targets(&self, positions: &[Point3<f32>]) -> Vec<Point3<f64>> {
         self.vertices.iter().map(|&v| positions[v as usize].cast::<f64>()).collect()
+    }
+}
+
+/// At most `most` of `total` vertices, ascending, the same in every run. They are drawn by chance: every so many-th vertex of a mesh that was made row by
+/// row would lie on a few columns.
+fn drawn(total: usize, most: usize) -> Vec<u32> {
+    let mut vertices: Vec<u32> = (0..total as u32).collect();
+    if total > most {
+        vertices.sort_by_cached_key(|&v| (scrambled(v), v));
+        vertices.truncate(most);
+        vertices.sort_unstable();
+    }
+    vertices
+}
+
+/// A number without any order (the finaliser of SplitMix64).
+fn scrambled(index: u32) -> u64 {
+    let mut z = u64::from(index).wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_lie_in_all_columns_and_rows() {
+        let (rows, columns, most) = (250, 120, 2500);
+        let vertices = drawn(rows * columns, most);
+        assert_eq!(vertices.len(), most);
+        assert!(vertices.windows(2).all(|v| v[0] < v[1]));
+        let count = |of: &dyn Fn(usize) -> usize, bins: usize| {
+            let mut counts = vec![0; bins];
+            vertices.iter().for_each(|&v| counts[of(v as usize)] += 1);
+            [*counts.iter().min().unwrap(), *counts.iter().max().unwrap()]
+        };
+        // 20.8 and 10 are to be expected; five standard deviations of chance.
+        let [fewest, most] = count(&|v| v % columns, columns);
+        assert!(fewest > 0 && most < 44, "{fewest} to {most}");
+        let [fewest, most] = count(&|v| v / columns, rows);
+        assert!(fewest > 0 && most < 26, "{fewest} to {most}");
+        assert_eq!(drawn(3, 5), [0, 1, 2]);
     }
 }
