@@ -65,6 +65,11 @@ impl Avatar {
     /// # Errors
     /// [`AvatarError`] names the first layer, motion or joint that breaks a rule.
     pub fn validate(&self) -> Result<(), AvatarError> {
+        self.validate_with(JOINT_COUNT)
+    }
+
+    /// The same where layers may hang on `joints` joints.
+    pub(crate) fn validate_with(&self, joints: usize) -> Result<(), AvatarError> {
         if self.name.trim().is_empty() {
             return Err(AvatarError::Avatar("it has no name".into()));
         }
@@ -77,7 +82,7 @@ impl Avatar {
         check_pose(&self.pose0).map_err(AvatarError::Skeleton)?;
         let mut names = BTreeSet::new();
         for layer in &self.layers {
-            layer.validate()?;
+            layer.validate(joints)?;
             if !names.insert(layer.name.as_str()) {
                 return Err(AvatarError::layer(&layer.name, "a second layer of this name; names must differ"));
             }
@@ -95,7 +100,7 @@ impl Avatar {
 }
 
 impl AvatarLayer {
-    fn validate(&self) -> Result<(), AvatarError> {
+    fn validate(&self, joint_count: usize) -> Result<(), AvatarError> {
         let wrong = |reason: String| Err(AvatarError::layer(&self.name, reason));
         if self.name.trim().is_empty() {
             return wrong("it has no name".into());
@@ -111,8 +116,8 @@ impl AvatarLayer {
             return wrong(format!("{vertices} vertices but skin weights for {weighted}"));
         }
         for (v, (joints, weights)) in self.weights.joints.iter().zip(&self.weights.weights).enumerate() {
-            if joints.iter().zip(weights).any(|(j, w)| *w > 0.0 && *j as usize >= JOINT_COUNT) {
-                return wrong(format!("vertex {v} hangs on a joint beyond the last of {JOINT_COUNT}"));
+            if joints.iter().zip(weights).any(|(j, w)| *w > 0.0 && *j as usize >= joint_count) {
+                return wrong(format!("vertex {v} hangs on a joint beyond the last of {joint_count}"));
             }
             let sum: f32 = weights.iter().sum();
             if !weights.iter().all(|w| w.is_finite() && *w >= 0.0) || sum <= 0.0 {
@@ -147,7 +152,7 @@ fn check_motion(motion: &Motion) -> Result<(), AvatarError> {
     Ok(())
 }
 
-fn check_pose(pose: &Pose) -> Result<(), String> {
+pub(crate) fn check_pose(pose: &Pose) -> Result<(), String> {
     if pose.rotations.len() != JOINT_COUNT {
         return Err(format!("a pose has {} rotations but there are {JOINT_COUNT} joints", pose.rotations.len()));
     }

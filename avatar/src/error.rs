@@ -22,6 +22,9 @@ pub enum AvatarError {
         /// The reason.
         reason: String,
     },
+    /// Helper joints that do not fit the avatar or each other.
+    #[error("helper joints: {0}")]
+    Helpers(String),
     /// The avatar as a whole, or its meta data.
     #[error("avatar: {0}")]
     Avatar(String),

@@ -2,6 +2,7 @@
 //!
 //! - [`Avatar`]: skeleton, the pose that the layers are in, layers with their skin weights, motions;
 //! - [`write_glb`]: one mesh node a layer, one skin, one animation a motion; with a single layer, a rigged scan;
+//! - [`write_glb_with_helpers`]: the same with joints beside the skeleton's, which show one motion of layers that swing;
 //! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named.
 //!
 //! ```
@@ -37,6 +38,7 @@ mod clip;
 mod dressed;
 mod error;
 mod glb;
+mod helpers;
 mod layer_mesh;
 mod motion;
 mod point_cache;
@@ -46,6 +48,7 @@ mod vrm;
 pub use dressed::{Avatar, AvatarLayer};
 pub use error::AvatarError;
 pub use glb::write_glb;
+pub use helpers::{HelperJoints, write_glb_with_helpers};
 pub use motion::{FileMotion, MotionJoint, read_motion};
 pub use point_cache::PointCache;
 pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, vrm_pose, write_vrm};

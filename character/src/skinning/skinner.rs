@@ -13,7 +13,7 @@ use crate::{CharacterError, SkinWeights};
 
 /// A mesh prepared for skinning frame after frame: single precision, vector instructions, one thread, no allocation a frame.
 ///
-/// Results are the same to the last bit on every machine.
+/// Results do not depend on the vector instructions that a machine has.
 #[derive(Debug, Clone)]
 pub struct Skinner {
     groups: Groups,
