@@ -36,14 +36,15 @@ pub fn finish(mut fuser: Fuser, progress: &(dyn Fn(f32) + Sync)) -> Result<Scan,
     check_enough_frames(&fuser)?;
     let mut report = FusionReport { settings: fuser.settings.clone(), ..FusionReport::default() };
     report.settings.poses = None;
-    if fuser.settings.poses.is_none() {
+    report.stands_still = fuser.stands_still;
+    if fuser.finds_poses() {
         close_turn(&mut fuser, None, &mut report);
         progress(0.3);
     }
     let field = match look(&mut fuser, &mut report)? {
         Some((whole, noise)) if is_wide(&noise, &fuser.settings) => fuse_noisy(&mut fuser, whole, &noise, &mut report)?,
         looked => {
-            let rounds = if looked.is_some() { fuser.settings.refine_rounds } else { 0 };
+            let rounds = if looked.is_some() && fuser.finds_poses() { fuser.settings.refine_rounds } else { 0 };
             let mut first = looked.map(|(whole, _)| whole);
             for round in 0..rounds {
                 refine(&mut fuser, first.take())?;
@@ -97,7 +98,9 @@ fn check_enough_frames(fuser: &Fuser) -> Result<(), FusionError> {
 /// The raw surface, model frame.
 fn extract(fuser: &mut Fuser, field: Tsdf) -> Result<Mesh, FusionError> {
     let turning = fuser.volume.is_some();
-    let minimum_weight = minimum_weight(&fuser.settings, turning, fuser.kept.len());
+    // Each place of a subject that stands still is seen by one or two sensors, in all their frames.
+    let frames = if fuser.stands_still { fuser.kept.leading().len() } else { fuser.kept.len() };
+    let minimum_weight = minimum_weight(&fuser.settings, turning, frames);
     let raw = fuser.clock.time("extract", || {
         let crossings = crossings(&field, minimum_weight);
         drop(field);
