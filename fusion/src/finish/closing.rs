@@ -46,7 +46,8 @@ pub struct Closing {
 /// Optimises `poses` (model_from_camera of each view, those of each sensor in the order of time) together. The first
 /// pose stays.
 pub fn close(views: &[DepthView], sensors: &[usize], poses: &mut [Rigid], rounds: usize) -> Closing {
-    let nodes: Vec<Node> = views.par_iter().map(|view| Node { view, points: samples(view, POINTS) }).collect();
+    let nodes: Vec<Node> =
+        views.par_iter().map(|view| Node { view, points: samples(view, POINTS), halfway: false }).collect();
     let center = subject_center(&nodes, poses);
     let pairs = overlapping_pairs(&nodes, poses);
     let views_of = |sensor: usize| sensors.iter().filter(|s| **s == sensor).count();
@@ -108,7 +109,7 @@ fn overlapping_pairs(nodes: &[Node], poses: &[Rigid]) -> Vec<(usize, usize)> {
         let total = probes.clone().count();
         let seen = probes.filter(|s| {
             let normal = turn * nalgebra::Vector3::from(s.normal);
-            match_pixel(nodes[j].view, &transform_point(&b_from_a, &s.point), normal.into(), 0.05).is_some()
+            match_pixel(&nodes[j], &transform_point(&b_from_a, &s.point), normal.into(), 0.05).is_some()
         });
         let least = if are_views { MIN_OVERLAP_OF_VIEWS } else { MIN_OVERLAP };
         seen.count() as f64 >= least * total.max(1) as f64

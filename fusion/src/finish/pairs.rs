@@ -16,6 +16,10 @@ use crate::{
 pub(crate) struct Node<'a> {
     pub view: &'a DepthView,
     pub points: Vec<Sample>,
+    /// Distances are taken along the direction halfway between the normals of a point and of the pixel it falls on: exact on
+    /// rounded surfaces, however wide the pixels are (Rusinkiewicz 2019, "A symmetric objective function for ICP"). Frames
+    /// of a turn, of which neighbours see surfaces alike, are compared along the pixel's, which are the steadier ones there.
+    pub halfway: bool,
 }
 
 /// The equations of each pair, about `center`, with residuals up to `gate` metres.
@@ -50,7 +54,7 @@ fn pair_system(
     for s in &a.points {
         let p = transform_point(&b_from_a, &s.point);
         let normal = turn_a * nalgebra::Vector3::from(s.normal);
-        if let Some((r, n, weight)) = match_pixel(b.view, &p, normal.into(), gate as f32) {
+        if let Some((r, n, weight)) = match_pixel(b, &p, normal.into(), gate as f32) {
             let kernel = 1.0 - (r / gate) * (r / gate);
             let q = transform_point(pose_b, &p);
             let n = turn_b * nalgebra::Vector3::from(n);
@@ -63,10 +67,11 @@ fn pair_system(
 
 /// Point-to-plane residual, normal and weight of a camera-frame point against the pixel it falls on.
 #[inline]
-pub(crate) fn match_pixel(view: &DepthView, p: &Point3<f32>, normal: [f32; 3], gate: f32) -> Option<(f64, [f32; 3], f32)> {
+pub(crate) fn match_pixel(node: &Node, p: &Point3<f32>, normal: [f32; 3], gate: f32) -> Option<(f64, [f32; 3], f32)> {
     if p.z < 0.05 {
         return None;
     }
+    let Node { view, halfway, .. } = *node;
     let camera = &view.camera;
     let inverse = 1.0 / p.z;
     let u = camera.fx as f32 * p.x * inverse + camera.cx as f32 + 0.5;
@@ -76,10 +81,13 @@ pub(crate) fn match_pixel(view: &DepthView, p: &Point3<f32>, normal: [f32; 3], g
     }
     let (q, n) = view.element_at(u as usize, v as usize).filter(|(_, n)| dot(*n, normal) >= 0.7)?;
     let d = [p.x - q[0], p.y - q[1], p.z - q[2]];
-    let r = dot(n, d);
+    // A point that lies some way beside the pixel on a rounded surface is under the pixel's tangent, but not under the chord.
+    let m = [n[0] + normal[0], n[1] + normal[1], n[2] + normal[2]];
+    let m = if halfway { m.map(|c| c / dot(m, m).sqrt()) } else { n };
+    let r = dot(m, d);
     let cosine = -dot(n, q) / dot(q, q).sqrt();
     let near = r.abs() < gate && dot(d, d) < 4.0 * gate * gate;
-    near.then(|| (f64::from(r), n, cosine * cosine / (q[2] * q[2]).max(0.25)))
+    near.then(|| (f64::from(r), m, cosine * cosine / (q[2] * q[2]).max(0.25)))
 }
 
 /// Increments of all poses from the pairs' systems; the first is held.

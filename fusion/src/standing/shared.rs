@@ -51,12 +51,12 @@ enum Look {
 fn look(s: &Sample, b_from_a: &Rigid, view: &DepthView) -> Look {
     let p = transform_point(b_from_a, &s.point);
     let camera = &view.camera;
-    let (u, v) = (
-        camera.fx as f32 * p.x / p.z + camera.cx as f32 + 0.5,
-        camera.fy as f32 * p.y / p.z + camera.cy as f32 + 0.5,
-    );
+    let (u, v) =
+        (camera.fx as f32 * p.x / p.z + camera.cx as f32 + 0.5, camera.fy as f32 * p.y / p.z + camera.cy as f32 + 0.5);
     let is_inside = p.z > 0.05 && u >= 0.0 && v >= 0.0 && u < camera.width as f32 && v < camera.height as f32;
-    let Some((q, n)) = is_inside.then(|| view.element_at(u as usize, v as usize)).flatten() else { return Look::Hidden };
+    let Some((q, n)) = is_inside.then(|| view.element_at(u as usize, v as usize)).flatten() else {
+        return Look::Hidden;
+    };
     let normal = b_from_a.rotation.cast::<f32>() * nalgebra::Vector3::from(s.normal);
     let distance = dot(n, [p.x - q[0], p.y - q[1], p.z - q[2]]);
     if q[2] - p.z > THROUGH {

@@ -134,8 +134,8 @@ fn subject_points(eyes: &[Eye], level_from_rig: &Rigid, axis: &Point3<f64>, grou
         let level_from_camera = level_from_rig * eye.rig_from_camera;
         points(eye).map(|p| level_from_camera * p.cast::<f64>()).filter(around).collect::<Vec<_>>()
     };
-    let all: Vec<Point3<f32>> = eyes.iter().flat_map(of).map(|p| p.cast()).collect();
-    largest_cluster(&all).into_iter().map(|p| p.cast()).collect()
+    let all: Vec<Point3<f32>> = eyes.iter().flat_map(of).map(Point3::cast).collect();
+    largest_cluster(&all).into_iter().map(Point3::cast).collect()
 }
 
 fn moved(floor: &Floor, motion: &Rigid) -> Floor {
