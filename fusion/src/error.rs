@@ -21,6 +21,17 @@ pub enum FusionError {
         /// The thing that was looked for and not found.
         reason: String,
     },
+    /// Resting sensors around a subject that stands still do not see enough of it in common.
+    #[error(
+        "the sensors `{sensors}` {reason}, and nothing turns before them: place them so that each sees part of what its \
+         neighbour sees, and find where they stand with `toile calibrate RIG --board`; or record a turn"
+    )]
+    NoOverlap {
+        /// Their names.
+        sensors: String,
+        /// The problem.
+        reason: String,
+    },
     /// The settings contradict themselves.
     #[error("settings: {0}")]
     Settings(String),

@@ -5,6 +5,7 @@ mod closing;
 mod fuse_again;
 mod noise;
 mod noisy;
+mod pairs;
 mod placing;
 mod poses;
 mod residuals;
@@ -15,5 +16,6 @@ mod whole;
 #[cfg(test)]
 pub(crate) use {closing::close, whole::minimum_weight};
 
+pub(crate) use pairs::{Node, apply, linearise, solve};
 pub(crate) use poses::settle_poses;
 pub use whole::finish;

@@ -22,6 +22,7 @@ mod report;
 mod rig;
 mod scan;
 mod settings;
+mod standing;
 mod subject;
 mod take;
 mod timings;

@@ -91,6 +91,9 @@ pub struct FusionReport {
     /// The sensors of a rig; nothing for a single one.
     #[serde(default)]
     pub sensors: Vec<SensorReport>,
+    /// True where nothing turned: the subject stood still before resting sensors all around.
+    #[serde(default)]
+    pub stands_still: bool,
     /// Degrees turned about the axis from the first to the last fused frame.
     pub turned_deg: f64,
     /// True when the turn is at least 340°, or when the step that closes it is about as wide as the widest one in it.

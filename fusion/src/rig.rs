@@ -25,7 +25,7 @@ mod sighting;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use found::RigFound;
+pub(crate) use found::{FoundSensor, RigFound};
 pub(crate) use join::join;
-pub(crate) use member::Member;
+pub(crate) use member::{Member, volume_at};
 pub(crate) use settled::{rig_warnings, settle};

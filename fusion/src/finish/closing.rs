@@ -1,16 +1,16 @@
 //! Closing the turn: all poses together, over frame pairs that see the same surface.
 //!
 //! Every pair contributes point-to-plane residuals between its two depth images; the first and last frames of a full
-//! turn overlap as well as neighbours do, so the seam's error spreads over the whole turn. In the linearised problem
-//! a pair's residuals depend on the difference of its two increments only: one 6×6 block a pair.
+//! turn overlap as well as neighbours do, so the seam's error spreads over the whole turn.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Point3, Vector6};
+use nalgebra::{Matrix6, Point3};
 use rayon::prelude::*;
 use toile_geometry::{Rigid, statistics::median, transform_point};
 
+use super::pairs::{Node, apply, linearise, match_pixel, solve};
 use crate::{
-    frame::{DepthView, dot},
-    tracking::{MAX_VIEWS, NormalEquations, Sample, hold_open_directions, increment, samples},
+    frame::DepthView,
+    tracking::{MAX_VIEWS, NormalEquations, hold_open_directions, samples},
 };
 
 /// Points of a frame used in each pair.
@@ -43,16 +43,11 @@ pub struct Closing {
     pub residual: f64,
 }
 
-/// A frame of the optimisation.
-struct Node<'a> {
-    view: &'a DepthView,
-    points: Vec<Sample>,
-}
-
 /// Optimises `poses` (model_from_camera of each view, those of each sensor in the order of time) together. The first
 /// pose stays.
 pub fn close(views: &[DepthView], sensors: &[usize], poses: &mut [Rigid], rounds: usize) -> Closing {
-    let nodes: Vec<Node> = views.par_iter().map(|view| Node { view, points: samples(view, POINTS) }).collect();
+    let nodes: Vec<Node> =
+        views.par_iter().map(|view| Node { view, points: samples(view, POINTS), halfway: false }).collect();
     let center = subject_center(&nodes, poses);
     let pairs = overlapping_pairs(&nodes, poses);
     let views_of = |sensor: usize| sensors.iter().filter(|s| **s == sensor).count();
@@ -65,82 +60,30 @@ pub fn close(views: &[DepthView], sensors: &[usize], poses: &mut [Rigid], rounds
     for round in 0..rounds {
         let share = round as f64 / (rounds - 1).max(1) as f64;
         let gate = GATES.0 * (GATES.1 / GATES.0).powf(share);
-        let systems = linearise(&nodes, poses, &pairs, &center, gate);
+        let systems = held(&nodes, poses, &pairs, &center, gate);
         if round == 0 {
             closing.seam_before = seam_offset(&pairs, &systems, seam);
         }
         apply(&solve(poses.len(), &pairs, &systems), poses, &center);
     }
-    let systems = linearise(&nodes, poses, &pairs, &center, GATES.1);
+    let systems = held(&nodes, poses, &pairs, &center, GATES.1);
     closing.seam_after = seam_offset(&pairs, &systems, seam);
     let (squares, weight) = systems.iter().fold((0.0, 0.0), |(s, w), n| (s + n.squares, w + n.weight));
     closing.residual = (squares / f64::max(weight, 1e-12)).sqrt();
     closing
 }
 
-fn linearise(
+/// The equations of each pair; what a pair leaves open stays as it is.
+fn held(
     nodes: &[Node],
     poses: &[Rigid],
     pairs: &[(usize, usize)],
     center: &Point3<f64>,
     gate: f64,
 ) -> Vec<NormalEquations> {
-    let one = |&(i, j): &(usize, usize)| {
-        let forth = pair_system(&nodes[i], &poses[i], &nodes[j], &poses[j], center, gate, 1.0);
-        let mut both = forth.plus(&pair_system(&nodes[j], &poses[j], &nodes[i], &poses[i], center, gate, -1.0));
-        hold_open_directions(&mut both);
-        both
-    };
-    pairs.par_iter().map(one).collect()
-}
-
-/// Residuals of the points of `a` against the surface seen by `b`; `sign` −1 exchanges whose increment counts.
-fn pair_system(
-    a: &Node,
-    pose_a: &Rigid,
-    b: &Node,
-    pose_b: &Rigid,
-    center: &Point3<f64>,
-    gate: f64,
-    sign: f64,
-) -> NormalEquations {
-    let b_from_a = pose_b.inverse() * pose_a;
-    let turn_a = b_from_a.rotation.cast::<f32>();
-    let turn_b = pose_b.rotation.cast::<f32>();
-    let mut sum = NormalEquations::zero();
-    for s in &a.points {
-        let p = transform_point(&b_from_a, &s.point);
-        let normal = turn_a * nalgebra::Vector3::from(s.normal);
-        if let Some((r, n, weight)) = match_pixel(b.view, &p, normal.into(), gate as f32) {
-            let kernel = 1.0 - (r / gate) * (r / gate);
-            let q = transform_point(pose_b, &p);
-            let n = turn_b * nalgebra::Vector3::from(n);
-            let weight = kernel * kernel * f64::from((s.weight * weight).sqrt());
-            sum.add(&q, center, n.into(), sign * r, weight);
-        }
-    }
-    sum
-}
-
-/// Point-to-plane residual, normal and weight of a camera-frame point against the pixel it falls on.
-#[inline]
-fn match_pixel(view: &DepthView, p: &Point3<f32>, normal: [f32; 3], gate: f32) -> Option<(f64, [f32; 3], f32)> {
-    if p.z < 0.05 {
-        return None;
-    }
-    let camera = &view.camera;
-    let inverse = 1.0 / p.z;
-    let u = camera.fx as f32 * p.x * inverse + camera.cx as f32 + 0.5;
-    let v = camera.fy as f32 * p.y * inverse + camera.cy as f32 + 0.5;
-    if u < 0.0 || v < 0.0 || u >= camera.width as f32 || v >= camera.height as f32 {
-        return None;
-    }
-    let (q, n) = view.element_at(u as usize, v as usize).filter(|(_, n)| dot(*n, normal) >= 0.7)?;
-    let d = [p.x - q[0], p.y - q[1], p.z - q[2]];
-    let r = dot(n, d);
-    let cosine = -dot(n, q) / dot(q, q).sqrt();
-    let near = r.abs() < gate && dot(d, d) < 4.0 * gate * gate;
-    near.then(|| (f64::from(r), n, cosine * cosine / (q[2] * q[2]).max(0.25)))
+    let mut systems = linearise(nodes, poses, pairs, center, gate);
+    systems.iter_mut().for_each(hold_open_directions);
+    systems
 }
 
 /// Pairs that see the same surface: along the way at growing strides, and across the seam.
@@ -166,48 +109,12 @@ fn overlapping_pairs(nodes: &[Node], poses: &[Rigid]) -> Vec<(usize, usize)> {
         let total = probes.clone().count();
         let seen = probes.filter(|s| {
             let normal = turn * nalgebra::Vector3::from(s.normal);
-            match_pixel(nodes[j].view, &transform_point(&b_from_a, &s.point), normal.into(), 0.05).is_some()
+            match_pixel(&nodes[j], &transform_point(&b_from_a, &s.point), normal.into(), 0.05).is_some()
         });
         let least = if are_views { MIN_OVERLAP_OF_VIEWS } else { MIN_OVERLAP };
         seen.count() as f64 >= least * total.max(1) as f64
     };
     all.par_iter().filter(overlaps).copied().collect()
-}
-
-/// Increments of all poses from the pairs' systems; the first is held.
-fn solve(count: usize, pairs: &[(usize, usize)], systems: &[NormalEquations]) -> Vec<Vector6<f64>> {
-    let mut matrix = DMatrix::<f64>::zeros(count * 6, count * 6);
-    let mut right = DVector::<f64>::zeros(count * 6);
-    for (&(i, j), system) in pairs.iter().zip(systems) {
-        let h = system.symmetric();
-        for (row, column, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
-            let mut block = matrix.fixed_view_mut::<6, 6>(row * 6, column * 6);
-            block += h * sign;
-        }
-        let mut a = right.fixed_rows_mut::<6>(i * 6);
-        a -= system.gradient;
-        let mut b = right.fixed_rows_mut::<6>(j * 6);
-        b += system.gradient;
-    }
-    let scale = matrix.diagonal().max().max(1e-12);
-    for k in 0..count * 6 {
-        matrix[(k, k)] += scale * 1e-8;
-    }
-    let mut held = matrix.fixed_view_mut::<6, 6>(0, 0);
-    held += Matrix6::identity() * (scale * 1e3);
-    match matrix.cholesky() {
-        Some(factor) => {
-            let x = factor.solve(&right);
-            (0..count).map(|k| x.fixed_rows::<6>(k * 6).into()).collect()
-        }
-        None => vec![Vector6::zeros(); count],
-    }
-}
-
-fn apply(steps: &[Vector6<f64>], poses: &mut [Rigid], center: &Point3<f64>) {
-    for (pose, x) in poses.iter_mut().zip(steps) {
-        *pose = increment(x, center) * *pose;
-    }
 }
 
 /// Median over seam pairs of the motion that each pair alone asks for, metres at the subject's centre.

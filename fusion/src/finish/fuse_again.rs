@@ -21,7 +21,7 @@ pub(crate) const GROUP: usize = 16;
 /// [`FusionError::TooLarge`] where the field outgrows its index.
 pub(crate) fn final_field(fuser: &mut Fuser) -> Result<Tsdf, FusionError> {
     let settings = &fuser.settings;
-    let as_pushed = settings.poses.is_some() || (settings.closing_rounds == 0 && settings.refine_rounds == 0);
+    let as_pushed = !fuser.finds_poses() || (settings.closing_rounds == 0 && settings.refine_rounds == 0);
     // At fine voxels memory decides: what is not needed any more goes before the next large thing comes.
     let nothing = fuser.model.empty_field(false);
     let pushed = std::mem::replace(&mut fuser.model.field, nothing);

@@ -45,14 +45,19 @@ pub(crate) fn fuse_noisy(
     noise: &Noise,
     report: &mut FusionReport,
 ) -> Result<Tsdf, FusionError> {
-    close_turn(fuser, Some(&whole), report);
+    if fuser.finds_poses() {
+        close_turn(fuser, Some(&whole), report);
+    }
     fuser.model.set_band(BAND * noise.sigma);
     let mut field = whole;
     for round in 0..ROUNDS {
         // The first field is that of the poses before: nothing is registered to it.
-        let gate = if round == 0 { 0.0 } else { TUKEY * noise.widest as f32 };
+        let gate = if round == 0 || !fuser.finds_poses() { 0.0 } else { TUKEY * noise.widest as f32 };
         let (next, poses) = settle_all(fuser, &field, gate, false)?;
         field = next;
+        if !fuser.finds_poses() {
+            continue;
+        }
         let back = poses.first().map_or_else(Rigid::identity, |p| fuser.kept.frames[0].model_from_camera * p.inverse());
         fuser.kept.frames.iter_mut().zip(&poses).for_each(|(kept, pose)| kept.model_from_camera = back * pose);
     }

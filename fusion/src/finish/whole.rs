@@ -27,6 +27,11 @@ const MIN_WEIGHT: u16 = 2;
 /// so the weight that makes a surface must grow with the number of frames.
 const MIN_WEIGHT_A_FRAME: f64 = 0.02;
 
+/// Frames of a usual turn (100) that see a place, without those that see it very obliquely.
+const SEEN_IN_A_TURN: f64 = 30.0;
+/// A subject that stands still is smoothed by at most so many times the passes.
+const MOST_SMOOTHING: f64 = 4.0;
+
 /// Closes the turn, fuses everything again and makes the scan.
 ///
 /// # Errors
@@ -36,14 +41,15 @@ pub fn finish(mut fuser: Fuser, progress: &(dyn Fn(f32) + Sync)) -> Result<Scan,
     check_enough_frames(&fuser)?;
     let mut report = FusionReport { settings: fuser.settings.clone(), ..FusionReport::default() };
     report.settings.poses = None;
-    if fuser.settings.poses.is_none() {
+    report.stands_still = fuser.stands_still;
+    if fuser.finds_poses() {
         close_turn(&mut fuser, None, &mut report);
         progress(0.3);
     }
     let field = match look(&mut fuser, &mut report)? {
         Some((whole, noise)) if is_wide(&noise, &fuser.settings) => fuse_noisy(&mut fuser, whole, &noise, &mut report)?,
         looked => {
-            let rounds = if looked.is_some() { fuser.settings.refine_rounds } else { 0 };
+            let rounds = if looked.is_some() && fuser.finds_poses() { fuser.settings.refine_rounds } else { 0 };
             let mut first = looked.map(|(whole, _)| whole);
             for round in 0..rounds {
                 refine(&mut fuser, first.take())?;
@@ -97,7 +103,9 @@ fn check_enough_frames(fuser: &Fuser) -> Result<(), FusionError> {
 /// The raw surface, model frame.
 fn extract(fuser: &mut Fuser, field: Tsdf) -> Result<Mesh, FusionError> {
     let turning = fuser.volume.is_some();
-    let minimum_weight = minimum_weight(&fuser.settings, turning, fuser.kept.len());
+    // Each place of a subject that stands still is seen by one or two sensors, in all their frames.
+    let frames = if fuser.stands_still { fuser.kept.leading().len() } else { fuser.kept.len() };
+    let minimum_weight = minimum_weight(&fuser.settings, turning, frames);
     let raw = fuser.clock.time("extract", || {
         let crossings = crossings(&field, minimum_weight);
         drop(field);
@@ -116,12 +124,23 @@ pub(crate) fn minimum_weight(settings: &FusionSettings, is_cut_out: bool, frames
     share.max(MIN_WEIGHT)
 }
 
+/// Passes of smoothing: as set, and more where a subject that stands still is seen in fewer frames than one that turns.
+/// What noise is left falls with the root of the frames, and with the passes about as fast.
+fn smoothing_passes(fuser: &Fuser) -> usize {
+    let passes = fuser.settings.smoothing_passes;
+    if !fuser.stands_still {
+        return passes;
+    }
+    let frames = fuser.kept.leading().len().max(1) as f64;
+    (passes as f64 * (SEEN_IN_A_TURN / frames).sqrt().clamp(1.0, MOST_SMOOTHING)).round() as usize
+}
+
 fn clean(fuser: &mut Fuser, mesh: Mesh, report: &mut FusionReport) -> Mesh {
+    let settings = FusionSettings { smoothing_passes: smoothing_passes(fuser), ..fuser.settings.clone() };
     // Known poses keep their own frame, whose zero is not the floor.
-    let settings = &fuser.settings;
     let on_floor = fuser.volume.as_ref().filter(|v| v.floor.is_some() && settings.poses.is_none());
     let cut = on_floor.and_then(|v| v.bottom).map(|bottom| bottom as f32);
-    let (mesh, cleaned) = fuser.clock.time("clean up", || clean_up(mesh, settings, cut));
+    let (mesh, cleaned) = fuser.clock.time("clean up", || clean_up(mesh, &settings, cut));
     report.triangles = mesh.triangles.len();
     report.holes_filled = cleaned.holes;
     report.filled_percent = cleaned.filled_percent;

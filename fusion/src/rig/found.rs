@@ -2,7 +2,7 @@
 
 use toile_geometry::Rigid;
 
-use super::moved::Push;
+use super::{member::Member, moved::Push};
 
 /// A further sensor whose place was found.
 #[derive(Debug, Clone)]
@@ -16,6 +16,21 @@ pub(crate) struct FoundSensor {
     /// The place by all frames together, room frame.
     pub room_from_camera: Rigid,
     pub push: Option<(Push, f64)>,
+}
+
+impl FoundSensor {
+    /// A sensor of which nothing is known but where it stands: before a subject that does not turn clocks do not matter.
+    pub(crate) fn resting(member: &Member, place: &Rigid) -> Self {
+        Self {
+            sensor: member.sensor,
+            frames_seen: member.len(),
+            noise: member.noise,
+            drift_ppm: 0.0,
+            by_arrival: false,
+            room_from_camera: *place,
+            push: None,
+        }
+    }
 }
 
 /// What was found about the further sensors.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use toile_capture::{Frame, Rig};
-use toile_geometry::Rigid;
+use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use super::{clocks::ClockMap, path::Path, sighting::Look};
 use crate::{
@@ -71,6 +71,16 @@ impl Member {
     /// Why the frame cannot be used.
     pub(crate) fn depth(&self, index: usize, within: Option<&SubjectVolume>) -> Result<CutDepth, DropReason> {
         self.preparer.cut(&self.frames[index].unpacked(), within)
+    }
+
+    /// The filtered depth (metres, 0 missing) of frames spread over the take.
+    pub(crate) fn filtered(&self) -> Vec<Vec<f32>> {
+        spread(&self.frames).iter().filter_map(|frame| self.preparer.filtered(frame)).collect()
+    }
+
+    /// The ideal camera that the depth is seen with.
+    pub(crate) fn camera(&self) -> PinholeCamera {
+        self.preparer.camera()
     }
 
     /// Some frames cut to a part of space, and how the disk stood then.

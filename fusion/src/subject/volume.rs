@@ -27,7 +27,7 @@ const CELL: f32 = 0.10;
 /// Smallest number of moving pixels a frame that counts as somebody, as a share of the image.
 const MIN_MOVING: f32 = 0.001;
 /// Room left around what moved, metres.
-const MARGIN: f64 = 0.06;
+pub(super) const MARGIN: f64 = 0.06;
 
 /// Finds the subject's volume in depth images (metres, edges already dropped) spread over a take.
 ///
@@ -50,7 +50,7 @@ pub(crate) fn find_volume(camera: &PinholeCamera, depths: &[Vec<f32>]) -> Result
 }
 
 /// Pixels between the rows, and between the columns, that the survey looks at.
-const SAMPLE: usize = 2;
+pub(super) const SAMPLE: usize = 2;
 
 fn moving_points(camera: &PinholeCamera, depths: &[Vec<f32>], background: &Background) -> Vec<Point3<f32>> {
     let (w, h) = (camera.width as usize, camera.height as usize);
@@ -71,7 +71,7 @@ fn moving_points(camera: &PinholeCamera, depths: &[Vec<f32>], background: &Backg
 }
 
 /// The points in the largest 26-connected group of occupied cells.
-fn largest_cluster(points: &[Point3<f32>]) -> Vec<Point3<f32>> {
+pub(super) fn largest_cluster(points: &[Point3<f32>]) -> Vec<Point3<f32>> {
     use std::collections::BTreeMap;
     let cell = |p: &Point3<f32>| [p.x, p.y, p.z].map(|c| (c / CELL).floor() as i32);
     let mut counts: BTreeMap<[i32; 3], usize> = BTreeMap::new();
@@ -128,14 +128,14 @@ fn cylinder(subject: &[Point3<f32>], image_up: ImageSide, floor: Option<Floor>) 
 }
 
 /// Height of the floor plane at (x, z), leveled frame (where it is level by construction).
-fn floor_height(leveled_from_camera: &Rigid, floor: &Floor, x: f64, z: f64) -> f64 {
+pub(super) fn floor_height(leveled_from_camera: &Rigid, floor: &Floor, x: f64, z: f64) -> f64 {
     let n = leveled_from_camera.rotation * floor.normal;
     let on = leveled_from_camera * floor.point;
     on.y - (n.x * (x - on.x) + n.z * (z - on.z)) / n.y.max(0.1)
 }
 
 /// A frame with the camera's centre as origin, +Y = `up`, +Z towards the camera (backwards along its axis).
-fn level(up: Vector3<f64>) -> Rigid {
+pub(super) fn level(up: Vector3<f64>) -> Rigid {
     let y = up.normalize();
     let back = Vector3::new(0.0, 0.0, -1.0);
     let z = (back - y * y.dot(&back)).try_normalize(1e-6).unwrap_or_else(Vector3::z);
@@ -144,14 +144,14 @@ fn level(up: Vector3<f64>) -> Rigid {
     Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_rotation_matrix(&rows))
 }
 
-fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+pub(super) fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut all: Vec<f64> = values.collect();
     all.sort_unstable_by(f64::total_cmp);
     all
 }
 
 /// The value at share `q` of ascending values; 0 where there are none.
-fn percentile(ascending: &[f64], q: f64) -> f64 {
+pub(super) fn percentile(ascending: &[f64], q: f64) -> f64 {
     let last = ascending.len().saturating_sub(1);
     ascending.get((last as f64 * q).round() as usize).copied().unwrap_or(0.0)
 }

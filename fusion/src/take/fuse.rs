@@ -16,6 +16,7 @@ use crate::{
     finish::finish,
     report::DroppedFrame,
     rig::{Member, join},
+    standing::fuse_standing,
     timings::Stopwatch,
     tracking::MAX_VIEWS,
 };
@@ -38,7 +39,15 @@ pub fn fuse(
     let ReadFrames { leader, frames, unreadable, others } = clock.time("read", || read_all(source, progress))?;
     let volume = match settings.volume {
         Volume::All => None,
-        Volume::Auto => Some(clock.time("survey", || survey_sensor(&rig, leader, &spread(&frames), settings))?),
+        Volume::Auto => {
+            let found = clock.time("survey", || survey_sensor(&rig, leader, &spread(&frames), settings));
+            let is_still = matches!(found, Err(FusionError::NobodyInIt { .. }));
+            if is_still && settings.poses.is_none() && !others.is_empty() {
+                let groups = std::iter::once((leader, frames)).chain(others).collect();
+                return stand_still(&rig, groups, unreadable, clock, settings, progress);
+            }
+            Some(found?)
+        }
     };
     let mut fuser = Fuser::led_by(&rig, leader, volume, settings.clone())?;
     fuser.clock = clock;
@@ -49,6 +58,28 @@ pub fn fuse(
     push_all(&mut fuser, frames, progress)?;
     join_others(&mut fuser, &rig, others, &arrivals)?;
     finish(fuser, &|x| progress(0.5 + 0.5 * x))
+}
+
+/// Fuses a take in which nothing moves before several sensors.
+fn stand_still(
+    rig: &Rig,
+    groups: Vec<(usize, Vec<Waiting>)>,
+    unreadable: Vec<DroppedFrame>,
+    clock: Stopwatch,
+    settings: &FusionSettings,
+    progress: &(dyn Fn(f32) + Sync),
+) -> Result<Scan, FusionError> {
+    let (usable, others): (Vec<_>, Vec<_>) = groups.into_iter().partition(|g| usable_sensor(rig, g.0).is_ok());
+    let members = usable.into_iter().map(|(sensor, frames)| Member::new(rig, sensor, frames, settings)).collect();
+    let mut fuser = fuse_standing(rig, members, settings, clock)?;
+    fuser.log.seen += unreadable.len();
+    fuser.log.dropped.extend(unreadable);
+    fuser.log.sensors_not_used.extend(others.iter().map(|g| name_of(rig, g.0)));
+    finish(fuser, &|x| progress(0.5 + 0.5 * x))
+}
+
+fn name_of(rig: &Rig, sensor: usize) -> String {
+    rig.sensors.get(sensor).map_or_else(|| format!("number {sensor}"), |s| s.name.clone())
 }
 
 /// Fuses the frames of the rig's other sensors.
@@ -65,8 +96,7 @@ fn join_others(
         if joins && usable_sensor(rig, sensor).is_ok() {
             members.push(Member::new(rig, sensor, frames, &fuser.settings));
         } else {
-            let name = rig.sensors.get(sensor).map_or_else(|| format!("number {sensor}"), |s| s.name.clone());
-            fuser.log.sensors_not_used.push(name);
+            fuser.log.sensors_not_used.push(name_of(rig, sensor));
         }
     }
     if members.is_empty() { Ok(()) } else { join(fuser, rig, members, arrivals) }

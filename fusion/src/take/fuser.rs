@@ -62,6 +62,8 @@ pub struct Fuser {
     pub(crate) log: Log,
     /// Where the other sensors of the rig stand.
     pub(crate) rig: RigFound,
+    /// The subject does not turn: sensors all around see it from where they rest.
+    pub(crate) stands_still: bool,
     pub(crate) clock: Stopwatch,
 }
 
@@ -97,6 +99,7 @@ impl Fuser {
             settings,
             sensors: rig.sensors.clone(),
             rig: RigFound::default(),
+            stands_still: false,
             volume,
         })
     }
@@ -152,6 +155,11 @@ impl Fuser {
         }
         self.kept.frames.sort_by_key(|k| (k.device_time_ns, k.index));
         Ok(())
+    }
+
+    /// True where the frames' poses are found and refined one by one: neither known nor those of resting sensors.
+    pub(crate) fn finds_poses(&self) -> bool {
+        self.settings.poses.is_none() && !self.stands_still
     }
 
     /// Frames in a row without a trusted pose; 0 while the subject is followed.

@@ -1,6 +1,7 @@
 //! From a frame to the depth of the subject that is fused.
 
 use toile_capture::{Frame, Rig, Sensor};
+use toile_geometry::camera::PinholeCamera;
 
 use crate::{
     FusionError,
@@ -63,6 +64,16 @@ impl Preparer {
     pub(crate) fn cut(&self, frame: &Frame, within: Option<&SubjectVolume>) -> Result<CutDepth, DropReason> {
         let depth = self.filter.apply(frame).ok_or(DropReason::NoDepth)?;
         enough(self.cut_to(&depth, within))
+    }
+
+    /// The depth of a whole frame, metres; `None` where it has none of the sensor's size.
+    pub(crate) fn filtered(&self, frame: &Frame) -> Option<Vec<f32>> {
+        self.filter.apply(frame)
+    }
+
+    /// The ideal camera that the depth is seen with.
+    pub(crate) fn camera(&self) -> PinholeCamera {
+        self.filter.rectifier.camera
     }
 
     fn cut_to(&self, depth: &[f32], within: Option<&SubjectVolume>) -> CutDepth {
