@@ -40,6 +40,7 @@ mod stale;
 mod step;
 pub mod steps;
 mod summary;
+mod take_order;
 
 pub use body_edits::BodyEdits;
 pub use error::{Cause, PipelineError};
