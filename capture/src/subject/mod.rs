@@ -24,6 +24,7 @@ mod locked;
 mod pending;
 mod reading;
 mod reorder;
+mod reorder_plan;
 mod scan_take;
 
 pub use layer::{BODY, Layer};
@@ -36,5 +37,5 @@ pub use scan_take::ScanTake;
 
 /// Reads the text of `subject.toml` and of `pending.toml`; for `fuzz/`.
 pub(crate) fn parse(text: &str) {
-    let _ = (about::About::parse(text), about::parse_toml::<pending::Note>(text), reorder::parse(text));
+    let _ = (about::About::parse(text), about::parse_toml::<pending::Note>(text), reorder_plan::Plan::parse(text));
 }

@@ -9,7 +9,7 @@ use super::{
     about::{self, About},
     layer::{BODY, Layer, check_name},
     pending::Note,
-    reorder::is_reordering,
+    reorder_plan::is_reordering,
     scan_take::EXTENSION as SCAN,
 };
 use crate::{

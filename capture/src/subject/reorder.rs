@@ -7,19 +7,18 @@
 
 use std::{
     fs,
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
-use serde::{Deserialize, Serialize};
-
 use super::{
-    about::{self, About, parse_toml},
+    about::{self, About},
     layer::{Layer, check_name},
     reading::Subject,
+    reorder_plan::{Move, Plan, is_reordering, plan_path},
 };
 use crate::{
     CaptureError,
-    files::{atomic_write, read_text, sync_parent, with_suffix},
+    files::{atomic_write, sync_parent, with_suffix},
 };
 
 /// The extension that a file has between its old name and its new one.
@@ -43,26 +42,6 @@ pub struct Reordered {
     pub takes: Vec<(String, String)>,
     /// What the operator should know, a sentence each.
     pub remarks: Vec<String>,
-}
-
-/// The content of `reorder.toml`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Plan {
-    /// True once every file has moved aside.
-    set_aside: bool,
-    /// The new text of `subject.toml`.
-    subject: String,
-    /// Folders of `build/` that no longer belong to the take that they are called by.
-    outdated: Vec<String>,
-    /// Files and folders by their paths in the subject's folder.
-    #[serde(default)]
-    moves: Vec<Move>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Move {
-    from: String,
-    to: String,
 }
 
 /// Puts the takes in another order; see [`LockedSubject::reorder`](super::LockedSubject::reorder).
@@ -116,48 +95,6 @@ pub(super) fn complete_reorder(folder: &Path) -> Result<(), CaptureError> {
     }
     let path = plan_path(folder);
     fs::remove_file(&path).map_err(|error| CaptureError::io(&path, error))
-}
-
-/// True where a new order was begun and is not complete.
-pub(super) fn is_reordering(folder: &Path) -> bool {
-    plan_path(folder).is_file()
-}
-
-/// Reads the text of `reorder.toml`; for `fuzz/`.
-pub(super) fn parse(text: &str) -> bool {
-    Plan::parse(text).is_ok()
-}
-
-impl Plan {
-    fn read(folder: &Path) -> Result<Self, CaptureError> {
-        let path = plan_path(folder);
-        Self::parse(&read_text(&path)?).map_err(|reason| CaptureError::format(&path, reason))
-    }
-
-    fn parse(text: &str) -> Result<Self, String> {
-        let plan: Self = parse_toml(text)?;
-        let outside = plan.paths().find(|path| !is_inside(path)).map(str::to_string);
-        outside.map_or(Ok(plan), |path| Err(format!("names `{path}`, which is not in the subject's folder")))
-    }
-
-    fn paths(&self) -> impl Iterator<Item = &str> {
-        let moved = self.moves.iter().flat_map(|step| [&step.from, &step.to]);
-        moved.chain(&self.outdated).map(String::as_str)
-    }
-
-    fn write(&self, folder: &Path) -> Result<(), CaptureError> {
-        let path = plan_path(folder);
-        let text = toml::to_string(self).map_err(|error| CaptureError::format(&path, error.to_string()))?;
-        atomic_write(&path, text.as_bytes())
-    }
-}
-
-fn plan_path(folder: &Path) -> PathBuf {
-    folder.join("reorder.toml")
-}
-
-fn is_inside(path: &str) -> bool {
-    !path.is_empty() && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
 fn check_order(order: &[usize], takes: usize) -> Result<(), String> {
