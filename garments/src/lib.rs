@@ -30,6 +30,7 @@ mod hem;
 mod labels;
 mod measure;
 mod mesh;
+mod order;
 mod report;
 mod settings;
 mod skin;
@@ -48,6 +49,7 @@ pub use labels::{
     template::cloth_thickness,
     types::{Labels, Reason},
 };
+pub use order::{Bulk, are_taken_off};
 pub use report::{ExtractionReport, Warning};
 pub use settings::{CullSettings, ExtractSettings, Labelling, StackMethod, StackSettings};
 pub use skin::{common_frame::weights as weights_from_body, hanging::mark_free, layer_weights::carry_weights};

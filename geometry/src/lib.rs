@@ -60,6 +60,7 @@ pub mod statistics;
 pub mod surface_solve;
 pub mod topology;
 pub mod triangle;
+pub mod volume;
 
 pub use error::GeometryError;
 pub use mesh::Mesh;

@@ -5,7 +5,7 @@ use std::{
     str::FromStr,
 };
 
-use toile_capture::{Layer, Replay, Source, Subject, files::read_text};
+use toile_capture::{Layer, Replay, Source, Subject, files::read_text, subject::BODY};
 use toile_driver_kinect1::{self as kinect1, Kinect1};
 use toile_driver_kinect2::{self as kinect2, Kinect2};
 use toile_driver_realsense::{self as realsense, Realsense};
@@ -133,8 +133,8 @@ fn stereo_settings(file: &Path) -> Result<StereoSettings, LiveError> {
 
 /// The virtual person wears what the subject's layers are called.
 fn synthetic(seed: u64, subject: &Subject, layer: &Layer) -> Result<SyntheticSettings, LiveError> {
-    let worn = subject.layers().iter().take(layer.number).chain([layer]).skip(1);
-    let names: Vec<&str> = if layer.number == 0 { Vec::new() } else { worn.map(|l| l.name.as_str()).collect() };
+    let worn = subject.layers().iter().take(layer.number).chain([layer]).filter(|worn| worn.name != BODY);
+    let names: Vec<&str> = if layer.name == BODY { Vec::new() } else { worn.map(|l| l.name.as_str()).collect() };
     let garment = |name: &&str| {
         let kinds = GarmentKind::ALL.map(GarmentKind::name).join(", ");
         let unknown = || LiveError::Usage(format!("--layer: the virtual person has no `{name}`; choose of {kinds}"));

@@ -41,6 +41,7 @@ mod stale;
 mod step;
 pub mod steps;
 mod summary;
+mod take_order;
 
 pub use animate::{AnimateOptions, Animated, AnimationReport, animate};
 pub use body_edits::BodyEdits;

@@ -18,6 +18,7 @@ use crate::{
         cut::Cut, export::Export, fit::Fit, fuse::Fuse, page::Page, pose::PoseUnder, read_scan::ReadScan, stack::Stack,
     },
     summary::{Measured, Summary, TakeSummary},
+    take_order,
 };
 
 /// Takes the subject at `root` to `goal`, doing whatever is missing.
@@ -30,6 +31,9 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
     let run = Run::open(root, options.last_layer.as_deref(), settings, observer)?;
     // What would fail only after a long time.
     (1..run.layers.len()).try_for_each(|n| garment::given_thickness(&run, n).map(drop))?;
+    if goal > Goal::Scans {
+        take_order::check_first(&run)?;
+    }
     observer.plan(seconds(&run, goal));
     let mut summary = Summary { layers: vec!["body".into()], ..Summary::default() };
     for layer in &run.layers {
@@ -39,7 +43,14 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
     if goal == Goal::Scans {
         summary.files = run.layers.iter().map(|l| run.folders.scan(l)).collect();
     } else {
-        to_body(&run, goal, options, &mut summary)?;
+        let taken_off = take_order::taken_off(&run)?;
+        // What comes after it may have no answer just because of the order.
+        let because = |error| match &taken_off {
+            Some(sentence) => PipelineError::refused(root, format!("{error} (perhaps because of this: {sentence})")),
+            None => error,
+        };
+        summary.remarks.warnings.extend(taken_off.clone());
+        to_body(&run, goal, options, &mut summary).map_err(because)?;
     }
     summary.notes.extend(stale::note(&run.folders, goal));
     summary.notes.extend(run.remarks());

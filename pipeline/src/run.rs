@@ -88,6 +88,11 @@ impl<'a> Run<'a> {
         self.subject.as_ref().map_or_else(Vec::new, |subject| subject.remarks())
     }
 
+    /// A sentence where the first take is known not to be the body.
+    pub fn wrong_order(&self) -> Option<String> {
+        self.subject.as_ref().and_then(|subject| subject.wrong_order())
+    }
+
     /// Folder name of the body take.
     pub fn first_layer(&self) -> &str {
         self.layers.first().map_or("00-body", String::as_str)

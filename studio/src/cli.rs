@@ -40,6 +40,8 @@ pub enum Command {
     Calibrate(commands::calibrate::Calibrate),
     /// Show the contents of a recording, a folder or a subject, and whether it is healthy
     Inspect(commands::inspect::Inspect),
+    /// Put the takes in the order in which garments are put on: reversed, in any order, under other names
+    Reorder(commands::reorder::Reorder),
     /// Fuse takes into scans
     Fuse(commands::fuse::Fuse),
     /// Fit the body to the scan of the undressed person

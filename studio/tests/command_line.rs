@@ -20,6 +20,7 @@ fn help_shows_the_usual_way_and_every_command_has_an_example() {
         "fit",
         "extract",
         "edit",
+        "reorder",
         "export",
         "measure",
         "capture",

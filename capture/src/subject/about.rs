@@ -55,10 +55,15 @@ impl About {
 
     /// Writes the file, whole or not at all. Comments of the one that it replaces stay.
     pub(super) fn write(&self, folder: &Path) -> Result<(), CaptureError> {
+        atomic_write(&path(folder), self.text(folder, Some)?.as_bytes())
+    }
+
+    /// The text that takes the place of the file in `folder`, with its comments; `moved` says where a layer of the file went.
+    pub(super) fn text(&self, folder: &Path, moved: impl Fn(usize) -> Option<usize>) -> Result<String, CaptureError> {
         let path = path(folder);
         let text = toml::to_string(self).map_err(|error| CaptureError::format(&path, error.to_string()))?;
         let old = if is_there(&path) { read_text(&path)? } else { String::new() };
-        atomic_write(&path, keep_comments(&old, &text).as_bytes())
+        Ok(keep_comments(&old, &text, moved))
     }
 
     /// The fields that mean nothing to this program, such as misspelt ones.

@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use toml::Table;
 
+/// The header of a layer's table.
+const LAYERS: &str = "[[layers]]";
+
 /// Where a line stands: its table with the number of it, and its key.
 type Place = (String, usize, String);
 
@@ -15,9 +18,14 @@ struct Comments {
 }
 
 /// `new` with the comments of `old`, each at the line of the same table and key; those of lines that are gone stand at the
-/// end. `new` itself where the result would not say the same, which several lines of text in one value can bring about.
-pub(super) fn keep_comments(old: &str, new: &str) -> String {
-    let mut comments = read(old);
+/// end. `moved` says which layer of `new` a layer of `old` is (`None`: it is gone). `new` itself where the result would not
+/// say the same, which several lines of text in one value can bring about.
+pub(super) fn keep_comments(old: &str, new: &str, moved: impl Fn(usize) -> Option<usize>) -> String {
+    let now = |(table, count, key): Place| match count.checked_sub(1).filter(|_| table == LAYERS) {
+        Some(layer) => (table, moved(layer).map_or(usize::MAX, |layer| layer + 1), key),
+        None => (table, count, key),
+    };
+    let mut comments: BTreeMap<Place, Comments> = read(old).into_iter().map(|(place, c)| (now(place), c)).collect();
     if comments.is_empty() {
         return new.to_string();
     }
@@ -84,15 +92,23 @@ mod tests {
         let old = "# who\nname = \"a#b\" # the #1\n\n[[layers]] # first\nname = \"body\"\n# why\n[[layers]]\n\
                    # wool\nname = \"coat\"\nold = 1 # gone\n# end\n";
         let new = "name = \"a#b\"\nrig = \"\"\n\n[[layers]]\nname = \"body\"\n\n[[layers]]\nname = \"coat\"\n";
-        let kept = keep_comments(old, new);
+        let kept = keep_comments(old, new, Some);
         assert_eq!(
             kept,
             "# who\nname = \"a#b\" # the #1\nrig = \"\"\n\n[[layers]] # first\nname = \"body\"\n\n# why\n[[layers]]\n\
              # wool\nname = \"coat\"\n# gone\n# end\n"
         );
-        assert_eq!(keep_comments(&kept, new), kept);
+        assert_eq!(keep_comments(&kept, new, Some), kept);
         let tricky = "notes = \"\"\"\n# no comment\nname = 3 # nor this\n\"\"\"\n";
-        assert_eq!(keep_comments(tricky, new).parse::<Table>().unwrap(), new.parse::<Table>().unwrap());
-        assert_eq!(keep_comments("name = 1", new), new);
+        assert_eq!(keep_comments(tricky, new, Some).parse::<Table>().unwrap(), new.parse::<Table>().unwrap());
+        assert_eq!(keep_comments("name = 1", new, Some), new);
+    }
+
+    #[test]
+    fn comments_go_with_their_layers() {
+        let old = "[[layers]]\nname = \"body\" # 1\n# two\n[[layers]]\nname = \"a\"\n[[layers]]\nname = \"b\" # 3\n";
+        let new = "[[layers]]\nname = \"b\"\n[[layers]]\nname = \"body\"\n";
+        let kept = keep_comments(old, new, |layer| [Some(1), None, Some(0)][layer]);
+        assert_eq!(kept, "[[layers]]\nname = \"b\" # 3\n[[layers]]\nname = \"body\" # 1\n# two\n");
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::printable;
 
-/// Name of the layer of take 0.
+/// Name of the layer of take 0, as soon as the takes are in the order in which garments are put on.
 pub const BODY: &str = "body";
 
 /// The addition of a take, in the order of the takes.
@@ -33,7 +33,7 @@ pub struct Layer {
 impl Layer {
     /// Layer `number` called `name`, of type `garment`; the body is never a garment.
     pub(super) fn new(number: usize, name: &str, garment: Option<&str>) -> Self {
-        let garment = garment.filter(|_| number > 0).map(String::from);
+        let garment = garment.filter(|_| name != BODY).map(String::from);
         Self {
             number,
             name: name.to_string(),

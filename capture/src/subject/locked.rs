@@ -13,6 +13,7 @@ use super::{
     lock::SubjectLock,
     pending::{Note, PendingTake},
     reading::{RECORDING, Subject},
+    reorder::{NewName, Reordered, complete_reorder, reorder},
     scan_take::ScanTake,
 };
 use crate::{CaptureError, files::sync_parent};
@@ -86,7 +87,7 @@ impl LockedSubject {
     /// get.
     ///
     /// # Errors
-    /// [`CaptureError`] where the name is unusable or taken, carries another number, or the first take is not the body.
+    /// [`CaptureError`] where the name is unusable or taken, or carries another number.
     pub fn next_take(&self, name: &str, garment: Option<&str>) -> Result<PendingTake, CaptureError> {
         let wrong = |reason: String| Err(CaptureError::format(self.folder(), reason));
         let number = self.layers().len();
@@ -102,11 +103,6 @@ impl LockedSubject {
                 "`{given:02}-{name}` has the number {given}, but the next take is number {number}; give the name without \
                  a number"
             ));
-        }
-        if (number == 0) != (name == BODY) {
-            return wrong(
-                "take 0 is the body in underwear: import it first, with --layer body, and only it by that name".into(),
-            );
         }
         let layer = Layer::new(number, name, garment);
         let path = self.take_path(&layer);
@@ -124,7 +120,7 @@ impl LockedSubject {
             return Err(CaptureError::format(self.folder(), reason));
         };
         let mut layer = layer.clone();
-        layer.garment = garment.filter(|_| layer.number > 0).map(String::from).or(layer.garment);
+        layer.garment = garment.filter(|_| layer.name != BODY).map(String::from).or(layer.garment);
         if let Some(path) = self.whole_retake(&layer) {
             // Recorded, but never accepted (the program ended between): nothing that was captured is lost.
             self.reject(&path, &layer)?;
@@ -179,6 +175,22 @@ impl LockedSubject {
         }
     }
 
+    /// Puts the takes in another order, and gives them other names where `names` has them.
+    ///
+    /// Take `order[i]` becomes take i; `names[i]` is what its layer is then called. Without `names` each take keeps its name,
+    /// type and other facts. A name that a layer has already brings that layer's facts with it, whichever take it had. Takes
+    /// and edits by hand are renamed, never changed; what was built of takes that got another name is removed. A process
+    /// that is killed meanwhile loses nothing: the next one that opens the subject completes the work.
+    ///
+    /// # Errors
+    /// [`CaptureError`] where `order` does not name every take once, a name is unusable or stands twice, a file is in the way
+    /// (nothing is changed then), or a file cannot be renamed.
+    pub fn reorder(&mut self, order: &[usize], names: Option<&[NewName]>) -> Result<Reordered, CaptureError> {
+        let done = reorder(&self.subject, order, names)?;
+        self.subject = Subject::open(self.folder())?;
+        Ok(done)
+    }
+
     fn new(folder: &Path, lock: SubjectLock) -> Result<Self, CaptureError> {
         let absolute = std::path::absolute(folder).map_err(|error| CaptureError::io(folder, error))?;
         let name = absolute.file_name().map_or_else(|| "subject".into(), |name| name.to_string_lossy().into_owned());
@@ -191,6 +203,7 @@ impl LockedSubject {
 
     /// Opens a subject and completes what an interrupted run left.
     fn repaired(folder: &Path, lock: SubjectLock) -> Result<Self, CaptureError> {
+        complete_reorder(folder)?;
         let entered = About::read(folder)?;
         let subject = Subject::open(folder)?;
         let interrupted = Note::read(folder);

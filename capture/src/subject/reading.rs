@@ -7,8 +7,9 @@ use std::{
 
 use super::{
     about::{self, About},
-    layer::{Layer, check_name},
+    layer::{BODY, Layer, check_name},
     pending::Note,
+    reorder_plan::is_reordering,
     scan_take::EXTENSION as SCAN,
 };
 use crate::{
@@ -99,10 +100,10 @@ impl Subject {
         self.build_path().join(layer.label())
     }
 
-    /// What the operator should know of the folder itself, a sentence each: fields of `subject.toml` that mean nothing, and
-    /// takes that a killed capture left half recorded.
+    /// What the operator should know of the folder itself, a sentence each: fields of `subject.toml` that mean nothing,
+    /// takes that a killed capture left half recorded, and takes in an order that cannot be processed yet.
     pub fn remarks(&self) -> Vec<String> {
-        let file = printable_path(&about::path(&self.folder));
+        let (file, folder) = (printable_path(&about::path(&self.folder)), printable_path(&self.folder));
         let unknown = self.about.unknown_fields().into_iter();
         let unknown =
             unknown.map(|field| format!("{file}: the field {field} is not known; it is kept, but means nothing"));
@@ -113,7 +114,36 @@ impl Subject {
                  import` makes it a take"
             )
         });
-        unknown.chain(left).collect()
+        let renamed = is_reordering(&self.folder).then(|| {
+            format!(
+                "{folder}: its takes were being renamed when the program was interrupted, so some seem to be missing; \
+                 `toile process {folder}` goes on with it, as does every command that writes here"
+            )
+        });
+        unknown.chain(left).chain(self.wrong_order()).chain(renamed).collect()
+    }
+
+    /// A sentence where the first take is not the body, which it has to be before the subject is processed.
+    pub fn wrong_order(&self) -> Option<String> {
+        let first = self.about.layers.first().filter(|layer| layer.name != BODY)?.label();
+        let folder = printable_path(&self.folder);
+        let count = self.about.layers.len();
+        let last = self.about.layers.iter().position(|layer| layer.name == BODY);
+        Some(match last {
+            Some(body) if body + 1 == count => format!(
+                "{folder}: take 0 is {first} and the last take is the body, as where garments were taken off one by one; \
+                 `toile reorder {folder} --reverse` puts the takes in the order in which garments are put on"
+            ),
+            Some(_) => format!(
+                "{folder}: take 0 is {first}, but the body comes first, and then each garment in the order in which it is put \
+                 on; `toile reorder {folder} --order body,...` puts the takes in that order"
+            ),
+            None => format!(
+                "{folder}: take 0 is {first} and no take is called `body`: where garments were taken off one by one, bring in \
+                 the other takes, the one of the body (in underwear) last with --layer body, and then run `toile reorder \
+                 {folder} --reverse`; where take 0 shows the body, `toile reorder {folder} --names body,...` calls it so"
+            ),
+        })
     }
 
     /// Recordings in `takes/` that were not finished and that no process writes any more, by name.

@@ -49,6 +49,12 @@ impl Histogram {
         self.total += weight;
     }
 
+    /// Share of the weight whose colour is about this one: within a cell of it. Zero for an empty histogram.
+    pub fn share(&self, color: &[f32; 3]) -> f32 {
+        let here: f32 = around(color).map(|(cell, _)| self.cells[cell]).sum();
+        if self.total > 0.0 { here / self.total } else { 0.0 }
+    }
+
     /// Probability density at a colour, relative to an even spread over all cells, mixed with 1 % of that even spread.
     pub fn density(&self, color: &[f32; 3]) -> f32 {
         let count = self.cells.len() as f32;
@@ -95,5 +101,8 @@ mod tests {
         (0..100).for_each(|_| h.add(&lab([200, 30, 30]), 1.0));
         assert!(h.density(&lab([205, 35, 30])) > 20.0 * h.density(&lab([30, 30, 200])));
         assert_eq!(Histogram::default().density(&[0.0; 3]), 1.0);
+        h.add(&lab([30, 30, 200]), 100.0);
+        let shares = [[202, 32, 30], [30, 30, 200], [30, 200, 30]].map(|rgb| h.share(&lab(rgb)));
+        assert!(shares.iter().zip([0.5, 0.5, 0.0]).all(|(a, b)| (a - b).abs() < 1e-3), "{shares:?}");
     }
 }

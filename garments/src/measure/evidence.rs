@@ -15,6 +15,11 @@ const CLOTH_HEIGHT: f32 = 0.06;
 const CLOTH_SPREAD: f32 = 0.017;
 /// How far new cloth presses in the surface below, metres.
 const CLOTH_PRESS: f32 = 0.002;
+/// Share of new cloth that has the colour of what lies below it by chance; a garment of one colour has it as often as that
+/// colour lies below it.
+const SAME_BY_CHANCE: f32 = 0.3;
+/// Share of old surface that has the colour that it had.
+const SAME_AS_IT_WAS: f32 = 0.97;
 /// Extent of colour differences between different cloths.
 const COLOR_RANGE: f32 = 60.0;
 /// Log odds where no earlier surface is within reach, nats.
@@ -70,10 +75,11 @@ pub fn measure(take: &DressedTake, graph: &ScanGraph, settings: &ExtractSettings
 }
 
 impl Evidence {
-    /// Natural log odds of "new" against "old" at vertex `v`, from height and colour.
-    pub fn log_odds(&self, v: usize) -> f32 {
+    /// Natural log odds of "new" against "old" at vertex `v`, from height and colour. `of_this_color` is the share of the
+    /// garment that has the colour of `v`, where that is known; 0 otherwise.
+    pub fn log_odds(&self, v: usize, of_this_color: f32) -> f32 {
         self.height_log_odds(self.height[v], self.body_distance[v] - self.height[v])
-            + self.color_log_odds(self.color[v])
+            + self.color_log_odds(self.color[v], of_this_color)
     }
 
     /// Uncovered skin is a Laplacian around zero with rare outliers; earlier cloth, `slack` metres off the body, is one
@@ -94,15 +100,17 @@ impl Evidence {
         (new.max(1e-4) / old).ln().clamp(-LIMIT, LIMIT)
     }
 
-    /// The same cloth differs by an exponential amount; another cloth by any amount, and sometimes not at all.
-    fn color_log_odds(&self, difference: f32) -> f32 {
+    /// The same cloth differs by an exponential amount; another cloth by any amount, and sometimes not at all: always, where
+    /// both have one colour, and then colour says nothing.
+    fn color_log_odds(&self, difference: f32, of_this_color: f32) -> f32 {
         if difference.is_nan() {
             return 0.0;
         }
         let b = self.color_noise;
         let same = (-difference / b).exp() / b;
         let any = 1.0 / COLOR_RANGE;
-        let (old, new) = (0.97 * same + 0.03 * any, 0.3 * same + 0.7 * any);
+        let mixed = |share: f32| share * same + (1.0 - share) * any;
+        let (old, new) = (mixed(SAME_AS_IT_WAS), mixed(of_this_color.clamp(SAME_BY_CHANCE, SAME_AS_IT_WAS)));
         (new / old).ln().clamp(-LIMIT, LIMIT)
     }
 }

@@ -123,3 +123,35 @@ fn what_was_uncovered_is_not_new() {
     let cloth = std::f32::consts::TAU * RADIUS * 0.5;
     assert!((area / cloth - 1.0).abs() < 0.15, "{area} m² of {cloth}");
 }
+
+#[test]
+fn shorts_over_a_loose_shirt_of_the_same_colour_are_whole() {
+    let (person, pose) = (person(), Pose::identity());
+    // Loose at one side and close at the others.
+    let shirt = |y: f32, a: f32| if (0.5..1.0).contains(&y) { 0.012 + 0.045 * a.cos().max(0.0).powi(2) } else { 0.0 };
+    let before = column(|y, a| RADIUS + noise(y, a) + shirt(y, a), |y| if shirt(y, 0.0) > 0.0 { BLUE } else { SKIN });
+    let is_shorts = |y: f32| (0.2..0.75).contains(&y);
+    // Where the shirt hung most loosely, the shorts press it in by their own thickness.
+    let pressed = |y: f32, a: f32| (0.56..0.64).contains(&y) && a.cos() > 0.9;
+    let off = |y: f32, a: f32| shirt(y, a) + if is_shorts(y) && !pressed(y, a) { 0.012 } else { 0.0 };
+    let scan = column(|y, a| RADIUS + noise(y, a) + off(y, a), |y| if off(y, 0.0) > 0.0 { BLUE } else { SKIN });
+    let found = extracted(&take(&person, &scan, &before, &pose));
+    let iou = iou_of(&scan, &found.labels.garment, |p| is_shorts(p.y));
+    assert!(iou > 0.96 && found.report.openings_m.len() == 2, "{iou}, {:?}", found.report);
+}
+
+#[test]
+fn bare_skin_in_an_opening_stays_bare() {
+    let (person, pose, before) = (person(), Pose::identity(), bare());
+    let mut scan = dressed(0.008, BLUE);
+    let middle = Point3::new(0.0, 0.55, RADIUS);
+    for v in 0..scan.positions.len() {
+        let p = scan.positions[v];
+        if (p - middle).norm() < 0.05 {
+            let bare = RADIUS / p.x.hypot(p.z);
+            (scan.positions[v], scan.colors[v]) = (Point3::new(p.x * bare, p.y, p.z * bare), SKIN);
+        }
+    }
+    let found = extracted(&take(&person, &scan, &before, &pose));
+    assert_eq!(found.report.openings_m.len(), 3, "{:?}", found.report);
+}

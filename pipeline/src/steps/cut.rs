@@ -69,7 +69,7 @@ impl Cut<'_> {
 impl Step for Cut<'_> {
     type Report = ExtractionReport;
     const NAME: &'static str = "cut";
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
     const SECONDS: f64 = 3.0;
 
     fn label(&self) -> String {

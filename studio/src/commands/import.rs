@@ -17,6 +17,8 @@ use crate::{StudioError, commands::reach::must_exist, outcome::Answer, session::
 
 const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
+Where garments were taken off one by one, bring the takes in as they were recorded, each called by the outermost garment
+that is worn in it and the last one `body`; `toile reorder SUBJECT --reverse` then puts them in order.
 Formats, guessed when not said: toile-folder (depth/, color/, camera.json, timestamps.txt; also Open3D's), tum, uva,
 seven-scenes (also 3DMatch), redwood, associated (ICL-NUIM), stray-scanner, freenect (fakenect dumps), record3d (.r3d),
 sens (BundleFusion, ScanNet), bag (ROS 1, librealsense), ros-mcap (ROS 1 and 2), mcap.

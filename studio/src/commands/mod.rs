@@ -20,5 +20,6 @@ mod output;
 mod prior;
 pub mod process;
 mod reach;
+pub mod reorder;
 pub mod settings;
 pub mod synthesize;
