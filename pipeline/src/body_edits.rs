@@ -3,10 +3,15 @@
 use std::path::Path;
 
 use serde::Deserialize;
+use serde_json::{Map, Value};
+use toile_capture::{
+    files::{atomic_write, is_there},
+    subject::BODY,
+};
 use toile_character::JointRegressor;
 use toile_fitting::{FitSettings, HandLandmarks};
 
-use crate::{PipelineError, json};
+use crate::{PipelineError, folders::Folders, json};
 
 /// Statements by hand about the body.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -48,6 +53,29 @@ impl BodyEdits {
     /// [`PipelineError::Format`] with the field that is wrong.
     pub fn read(path: &Path) -> Result<Self, PipelineError> {
         json::read(path)
+    }
+
+    /// Those of a subject; none where it has no such file.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn of_subject(folders: &Folders) -> Result<Self, PipelineError> {
+        let path = folders.edits(BODY);
+        if is_there(&path) { Self::read(&path) } else { Ok(Self::default()) }
+    }
+
+    /// Notes in a subject's file that its first take is dressed; whatever else it says stays.
+    ///
+    /// # Errors
+    /// [`PipelineError`] where the file is wrong or cannot be written.
+    pub fn say_dressed(folders: &Folders) -> Result<(), PipelineError> {
+        let path = folders.edits(BODY);
+        let mut said: Map<String, Value> = if is_there(&path) { json::read(&path)? } else { Map::new() };
+        said.entry("version").or_insert_with(|| 1.into());
+        said.insert("dressed".into(), true.into());
+        let folder = path.parent().unwrap_or(&folders.root);
+        std::fs::create_dir_all(folder).map_err(|error| PipelineError::io(folder, error))?;
+        Ok(atomic_write(&path, &json::pretty(&said)?)?)
     }
 
     /// The settings of the fit, with what was said by hand.

@@ -4,13 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::printable;
 
-/// Name of the layer of take 0.
+/// Name of the layer of take 0, unless the person is dressed in it.
 pub const BODY: &str = "body";
 
 /// The addition of a take, in the order of the takes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
-    /// Number of the take: 0 is the body.
+    /// Number of the take: 0 is the body, or where that was never recorded undressed, the first clothes.
     #[serde(skip)]
     pub number: usize,
     /// Name without the number: `body`, `trousers`.
@@ -33,7 +33,7 @@ pub struct Layer {
 impl Layer {
     /// Layer `number` called `name`, of type `garment`; the body is never a garment.
     pub(super) fn new(number: usize, name: &str, garment: Option<&str>) -> Self {
-        let garment = garment.filter(|_| number > 0).map(String::from);
+        let garment = garment.filter(|_| name != BODY).map(String::from);
         Self {
             number,
             name: name.to_string(),
