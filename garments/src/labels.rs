@@ -86,7 +86,7 @@ fn label_by_evidence(
         labels = next;
     }
     if on.take.is_first {
-        return Labelled { garment_type, labels, uncovered_m2: 0.0 };
+        return Labelled { garment_type, labels: bare::close_prints(labels, on), uncovered_m2: 0.0 };
     }
     let labels = drop_uncovered(labels, on);
     let uncovered_m2 = labels.area_of(Reason::Uncovered, &on.graph.areas);

@@ -88,3 +88,22 @@ impl BodyEdits {
         settings
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn saying_that_a_take_is_dressed_keeps_what_else_was_said() {
+        let dir = tempfile::tempdir().unwrap();
+        let folders = Folders::new(dir.path());
+        assert!(!BodyEdits::of_subject(&folders).unwrap().dressed);
+        BodyEdits::say_dressed(&folders).unwrap();
+        assert!(BodyEdits::of_subject(&folders).unwrap().dressed);
+        let path = folders.edits(BODY);
+        std::fs::write(&path, r#"{"version": 1, "components": 15, "landmarks": {"navel": [0, 1, 0.1]}}"#).unwrap();
+        BodyEdits::say_dressed(&folders).unwrap();
+        let said = BodyEdits::of_subject(&folders).unwrap();
+        assert!(said.dressed && said.components == Some(15) && said.landmarks.contains_key("navel"), "{said:?}");
+    }
+}

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use toile_character::Joint;
 use toile_geometry::statistics::median;
 
-use super::types::Labels;
+use super::types::{Labels, Reason};
 use crate::{
     measure::{
         Measured,
@@ -23,7 +23,7 @@ use crate::{
 /// trouser legs end anywhere.
 const WORN: [f32; PART_COUNT] = {
     // head, neck, torso, pelvis, upper arm, lower arm, hand, upper leg, lower leg, foot
-    [-6.0, -1.5, 2.5, 3.0, 0.5, -0.5, -5.0, 2.0, 0.3, 0.5]
+    [-6.0, -2.5, 3.5, 4.0, 0.5, -0.5, -5.0, 2.0, 0.3, 0.5]
 };
 /// How far a guessed body is off where skin is bare, metres (scale of a Laplacian), and how far cloth stands off (mean of an
 /// exponential): the misfit of arms and legs of generated people in trousers and T-shirt, and the ease of tailors.
@@ -31,7 +31,7 @@ const BODY_OFF: f32 = 0.006;
 const STANDS_OFF: f32 = 0.015;
 /// Neither height nor colour says more than this, nats.
 const HEIGHT_LIMIT: f32 = 1.5;
-const COLOR_LIMIT: f32 = 4.0;
+const COLOR_LIMIT: f32 = 3.5;
 /// Limit of the sum, nats.
 const LIMIT: f32 = 7.0;
 /// Where nothing was seen, evidence counts this much.
@@ -47,9 +47,28 @@ const FEWEST: usize = 60;
 /// lightness, sun and blood the chroma.
 const LIGHTNESS: [f32; 2] = [12.0, 20.0];
 const CHROMA: [f32; 2] = [4.0, 9.0];
+/// Largest area of skin that is taken for a print, square metres, and the share of it that lies on the trunk.
+const PRINT: f32 = 0.015;
+const MOSTLY: f32 = 0.8;
 /// Volume of the colours that things have, CIELAB units cubed, over which unknown cloth is spread; and that of the histogram.
 const COLORS: f32 = 640_000.0;
 const HISTOGRAM: f32 = 100.0 * 168.0 * 144.0;
+
+/// The labels without skin that cloth surrounds on the trunk, up to the size of a hand: a print of the colour of skin.
+pub(super) fn close_prints(labels: Labels, on: &Measured) -> Labels {
+    let (set, areas) = on.graph.components(|v| !labels.garment[v]);
+    let mut of_trunk = vec![0.0f32; areas.len()];
+    for v in (0..on.graph.len()).filter(|&v| set[v] != u32::MAX) {
+        let parts = &on.evidence.parts[v];
+        of_trunk[set[v] as usize] +=
+            (parts[BodyPart::Torso as usize] + parts[BodyPart::Pelvis as usize]) * on.graph.areas[v];
+    }
+    let is_print = |set: u32| {
+        let k = set as usize;
+        set != u32::MAX && areas[k] < PRINT && of_trunk[k] > MOSTLY * areas[k]
+    };
+    labels.turned((0..on.graph.len()).filter(|&v| is_print(set[v])), Reason::Island)
+}
 
 /// Log odds of cloth against bare skin. The colours of `earlier` labels' cloth are used where there are any.
 pub(super) fn log_odds(on: &Measured, earlier: Option<&Labels>) -> Vec<f32> {
