@@ -48,6 +48,21 @@ fn takes_are_numbered_and_come_back() {
 }
 
 #[test]
+fn a_first_take_may_be_dressed_where_that_is_said() {
+    let temp = tempfile::tempdir().unwrap();
+    let mut subject = LockedSubject::create(temp.path()).unwrap();
+    assert!(subject.next_take("clothes", None).unwrap_err().to_string().contains("--dressed"));
+    assert!(subject.dressed_take("body", None).unwrap_err().to_string().contains("not called `body`"));
+    let take = subject.dressed_take("t-shirt", Some("top")).unwrap();
+    record_frames(&take.path, 2, 1, 1200);
+    subject.accept(take).unwrap();
+    assert_eq!(subject.layers()[0].label(), "00-t-shirt");
+    assert_eq!(subject.layers()[0].garment.as_deref(), Some("top"));
+    assert!(subject.dressed_take("coat", None).unwrap_err().to_string().contains("has takes already"));
+    assert_eq!(subject.next_take("coat", None).unwrap().layer.label(), "01-coat");
+}
+
+#[test]
 fn a_retake_keeps_the_old_take() {
     let temp = tempfile::tempdir().unwrap();
     let mut subject = LockedSubject::create(temp.path()).unwrap();

@@ -1,6 +1,7 @@
 //! Shape and pose of the statistical body from a scan, weights onto scans, measurements, posing under clothes.
 //!
 //! - [`fit_body`]: shape and pose of one scan (Hu et al. 2017, eq. 4), conformation, stature and girths;
+//! - [`take_on_bare_skin`]: the body of somebody dressed takes on the skin that is bare;
 //! - [`find_upright`]: which way up a scan is;
 //! - [`rig_scan`], [`rigged_scan`]: skin weights onto the scan itself;
 //! - [`pose_under`]: any skinned mesh posed inside a more dressed scan (eq. 5 and 6);
@@ -25,7 +26,7 @@ mod under;
 pub use {
     conform::ScanLandmark,
     error::FittingError,
-    fit::{BodyFit, DistanceStats, FitReport, Mend, Verdict, find_upright, fit_body},
+    fit::{BodyFit, DistanceStats, FitReport, Mend, PartShown, Verdict, find_upright, fit_body, take_on_bare_skin},
     measure::{
         definition::MeasureKind,
         extremes::{Girth, Measurements, measure_extremes, stature},

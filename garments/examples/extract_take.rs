@@ -104,6 +104,7 @@ impl Subject {
         let previous = self.previous(ply::read(&input.join(&layers[n - 1]).join("scan.ply"))?, n);
         let take = DressedTake {
             scan: &scan,
+            is_first: false,
             previous: &previous,
             body: &self.body.posed_mesh(&self.poses[n]),
             weights: &self.body.weights,

@@ -77,6 +77,19 @@ pub fn extract(
     Ok(Extraction { labels, in_take, garment, weights, report, warnings })
 }
 
+/// Of each vertex of a dressed take's scan, whether it is cloth; the rest is skin and hair. Made for takes that no undressed one
+/// came before ([`DressedTake::is_first`]).
+///
+/// # Errors
+/// As [`extract`].
+pub fn find_cloth(take: &DressedTake, settings: &ExtractSettings) -> Result<Vec<bool>, GarmentError> {
+    settings.check()?;
+    take.check()?;
+    let on = Measured::new(take, settings);
+    let Labelled { garment_type, labels, .. } = labels::label(&on, settings)?;
+    Ok(settle(labels, &on, garment_type, settings).garment)
+}
+
 /// The labels with islands, closed patches and hems settled. Those of a template stay as they are: the seed corrects
 /// them by hand.
 fn settle(labels: Labels, on: &Measured, garment_type: GarmentType, settings: &ExtractSettings) -> Labels {

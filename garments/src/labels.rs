@@ -1,11 +1,12 @@
 //! New garment or not: the label of every scan vertex.
 //!
 //! Each step is a function from labels to labels and leaves a [`Reason`](types::Reason) where it had the last word. The
-//! first labels come from one energy ([`energy`]) over evidence, place on the body and colours ([`odds`]), or from the
-//! nearest body vertex as in the seed ([`nearest_body`]). Patches that cloth worn before swung into or that were
+//! first labels come from one energy ([`energy`]) over evidence, place on the body and colours ([`odds`]; [`bare`] where
+//! nothing was scanned before), or from the nearest body vertex as in the seed ([`nearest_body`]). Patches that cloth worn before swung into or that were
 //! uncovered are not new ([`swung`], [`uncovered`]); islands and patches that nobody saw are settled by their
 //! surroundings ([`islands`], [`closed_patches`]).
 
+mod bare;
 pub(crate) mod closed_patches;
 pub(crate) mod energy;
 pub(crate) mod guess;
@@ -83,6 +84,9 @@ fn label_by_evidence(
         let next = energy.minimise(log_odds(on, garment_type, Some(&labels)), &[]);
         settled = next.garment == labels.garment;
         labels = next;
+    }
+    if on.take.is_first {
+        return Labelled { garment_type, labels: bare::close_prints(labels, on), uncovered_m2: 0.0 };
     }
     let labels = drop_uncovered(labels, on);
     let uncovered_m2 = labels.area_of(Reason::Uncovered, &on.graph.areas);

@@ -44,7 +44,7 @@ pub use edits::{
     format::{EditName, Edits, HemLine, Mark, Stroke, VERSION as EDITS_VERSION},
 };
 pub use error::GarmentError;
-pub use extract::{Extraction, extract};
+pub use extract::{Extraction, extract, find_cloth};
 pub use labels::{
     template::cloth_thickness,
     types::{Labels, Reason},

@@ -35,6 +35,8 @@ const UNSURE: f32 = 0.7;
 pub enum Warning {
     /// Nothing new is worn in this take.
     NothingNew,
+    /// No cloth is worn in a first take that was said to be dressed.
+    NoClothes,
     /// Scan areas lie well inside the surface worn before: something was taken off, or pressed in; square metres.
     TakenOff(f32),
     /// The new cloth covers the torso and each leg separately, or lies in pieces on different parts of the body.
@@ -43,9 +45,19 @@ pub enum Warning {
     EditWithoutEffect(WithoutEffect),
 }
 
+impl Warning {
+    /// Whether the take gives no garment.
+    pub fn is_empty(&self) -> bool {
+        matches!(self, Self::NothingNew | Self::NoClothes)
+    }
+}
+
 impl std::fmt::Display for Warning {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Self::NoClothes => {
+                write!(f, "no clothes were found in this take: does it show the undressed body after all?")
+            }
             Self::NothingNew => write!(f, "no new garment was found in this take: was one put on before it?"),
             Self::TakenOff(area) => {
                 write!(f, "{:.0} cm² of the scan lie inside what was worn before: was something taken off?", area * 1e4)
@@ -139,9 +151,12 @@ pub(crate) fn warnings(
     is_two: bool,
     edits: Option<&Applied>,
 ) -> Vec<Warning> {
-    let area = uncovered_m2.max(sunken_area(on, labels));
+    let is_first = on.take.is_first;
+    // of a body that was guessed, nothing can have been taken off
+    let area = if is_first { 0.0 } else { uncovered_m2.max(sunken_area(on, labels)) };
     let mut warnings = Vec::new();
-    warnings.extend(garment.is_empty().then_some(Warning::NothingNew));
+    let nothing = if is_first { Warning::NoClothes } else { Warning::NothingNew };
+    warnings.extend(garment.is_empty().then_some(nothing));
     warnings.extend((area > SUNKEN_AREA).then_some(Warning::TakenOff(area)));
     warnings.extend(is_two.then_some(Warning::TwoAtOnce));
     let without_effect = edits.map_or(&[][..], |edits| &edits.without_effect);

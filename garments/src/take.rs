@@ -13,6 +13,8 @@ pub struct DressedTake<'a> {
     pub scan: &'a Mesh,
     /// The surface worn before (the scan of the take before), posed into this scan, with colours.
     pub previous: &'a Mesh,
+    /// No take was scanned before: `previous` is the body as it was guessed, and cloth is told from bare skin.
+    pub is_first: bool,
     /// The body posed into this scan, on the template's triangles.
     pub body: &'a Mesh,
     /// Skin weights of the body, one for each of its vertices.

@@ -46,6 +46,7 @@ fn a_skirt_is_not_torn_between_the_legs() {
         let rest = Pose::identity();
         let take = DressedTake {
             scan: skirt,
+            is_first: false,
             previous: &body.mesh,
             body: &body.mesh,
             weights: &body.weights,

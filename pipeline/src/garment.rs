@@ -8,6 +8,10 @@ use crate::{PipelineError, Run};
 /// No cloth is taken for thicker, millimetres: stacking looks twice as far for the layers below.
 const THICKEST_MM: f32 = 10.0;
 
+/// Folder name of a first take that was imported as the body, and the name of the clothes that it turned out to show.
+const BODY_TAKE: &str = "00-body";
+const CLOTHES: &str = "00-clothes";
+
 /// A garment of the avatar.
 #[derive(Debug, Clone, Serialize)]
 pub struct Garment {
@@ -21,17 +25,22 @@ pub struct Garment {
     /// Folder name of its take.
     #[serde(skip)]
     pub layer: String,
+    /// Its name in the avatar and the report: the folder's, but for the clothes of a first take that is called `body`.
+    #[serde(skip)]
+    pub name: String,
 }
 
 impl Garment {
-    /// The garment that was cut out of take `number`.
+    /// The garment that was cut out of take `number` (0 where the first take is dressed).
     ///
     /// # Errors
     /// [`PipelineError`] where `subject.toml` gives a thickness that no cloth has.
     pub fn new(run: &Run, number: usize, cut: &ExtractionReport) -> Result<Self, PipelineError> {
         let garment_type = run.garment_type(number).unwrap_or(cut.garment_type);
         let thickness = given_thickness(run, number)?.unwrap_or_else(|| cloth_thickness(garment_type));
-        Ok(Self { number, garment_type, thickness, layer: run.layers[number].clone() })
+        let layer = run.layers[number].clone();
+        let name = if layer == BODY_TAKE { CLOTHES.into() } else { layer.clone() };
+        Ok(Self { number, garment_type, thickness, layer, name })
     }
 }
 

@@ -37,6 +37,7 @@ mod rigged_scan;
 mod run;
 mod scan_survey;
 pub mod settings;
+mod skin_colors;
 mod stale;
 mod step;
 pub mod steps;

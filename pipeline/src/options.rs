@@ -38,6 +38,8 @@ pub struct Options {
     pub settings: Option<PathBuf>,
     /// Settings of the fusion that were chosen for this run alone.
     pub fusion: FusionChoice,
+    /// The first take shows the person dressed; it is kept in `edits/body.json`.
+    pub dressed: bool,
 }
 
 /// How the avatar moves.

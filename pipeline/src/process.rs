@@ -8,7 +8,7 @@ use toile_character::BodyModel;
 use crate::{
     Observer, PipelineError, Run, Settings,
     avatar_choice::AvatarChoice,
-    body_file::{Body, BodyFile},
+    body_file::Body,
     garment::{self, Garment},
     json,
     options::{Goal, MotionChoice, Options},
@@ -28,10 +28,13 @@ use crate::{
 pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observer) -> Result<Summary, PipelineError> {
     let settings = settings::read(Some(root), options.settings.as_deref())?;
     let settings = Settings { fusion: options.fusion.over(&settings.fusion), ..settings };
-    let run = Run::open(root, options.last_layer.as_deref(), settings, observer)?;
+    let mut run = Run::open(root, options.last_layer.as_deref(), settings, observer)?;
+    if options.dressed && !run.is_first_dressed() {
+        run.say_dressed()?;
+    }
     // What would fail only after a long time.
-    (1..run.layers.len()).try_for_each(|n| garment::given_thickness(&run, n).map(drop))?;
-    if goal > Goal::Scans {
+    (run.first_garment()..run.layers.len()).try_for_each(|n| garment::given_thickness(&run, n).map(drop))?;
+    if goal > Goal::Scans && !run.is_first_dressed() {
         take_order::check_first(&run)?;
     }
     observer.plan(seconds(&run, goal));
@@ -76,8 +79,8 @@ fn to_body(run: &Run, goal: Goal, options: &Options, summary: &mut Summary) -> R
     let (model, folders) = (BodyModel::load_default()?, &run.folders);
     let fit = summary.hear(run.step(&Fit::of_subject(run, &model)?)?);
     summary.decided.body = Some(fit);
-    let BodyFile { stature_m, girths_m, volume_m3, .. } = json::read(&folders.body_json())?;
-    summary.measurements = Some(Measured { stature_m, girths_m, volume_m3 });
+    let part = summary.decided.body.as_ref().and_then(|fit| fit.part.as_ref());
+    summary.measurements = Some(Measured::of(json::read(&folders.body_json())?, part));
     summary.files = vec![folders.body_mesh(), folders.body_json()];
     if goal == Goal::Body {
         return Ok(());
@@ -91,9 +94,13 @@ fn to_body(run: &Run, goal: Goal, options: &Options, summary: &mut Summary) -> R
 /// The garments of all takes, stacked; a take in which nothing new is worn gives none.
 fn dress(run: &Run, model: &BodyModel, body: &Body, summary: &mut Summary) -> Result<Vec<Garment>, PipelineError> {
     let mut garments = Vec::new();
-    for number in 1..run.layers.len() {
-        let pose = summary.hear(run.step(&PoseUnder { run, number, body, model })?);
-        let record = run.step(&Cut { run, number, worn_as: &pose.worn_as_in, body })?;
+    for number in run.first_garment()..run.layers.len() {
+        let pose = match number {
+            0 => None,
+            _ => Some(summary.hear(run.step(&PoseUnder { run, number, body, model })?)),
+        };
+        let worn_as = pose.as_ref().map_or(run.first_layer(), |pose| &pose.worn_as_in);
+        let record = run.step(&Cut { run, number, worn_as, body })?;
         let is_worn = record.failures.is_empty();
         let cut = summary.hear(record);
         if is_worn {
@@ -102,11 +109,11 @@ fn dress(run: &Run, model: &BodyModel, body: &Body, summary: &mut Summary) -> Re
             // Also what an earlier run made of it.
             remove(&run.folders.garment(&run.layers[number]))?;
         }
-        (summary.decided.takes[number].pose, summary.decided.takes[number].cut) = (Some(pose), Some(cut));
+        (summary.decided.takes[number].pose, summary.decided.takes[number].cut) = (pose, Some(cut));
     }
     let stacked = summary.hear(run.step(&Stack { run, body, garments: &garments })?);
     summary.decided.stack = Some(stacked);
-    summary.layers.extend(garments.iter().map(|g| g.layer.clone()));
+    summary.layers.extend(garments.iter().map(|g| g.name.clone()));
     Ok(garments)
 }
 
@@ -150,7 +157,8 @@ fn remove(path: &Path) -> Result<(), PipelineError> {
 
 /// Expected seconds to `goal`.
 fn seconds(run: &Run, goal: Goal) -> f64 {
-    let (takes, garments) = (run.layers.len() as f64, run.layers.len().saturating_sub(1) as f64);
+    let takes = run.layers.len() as f64;
+    let garments = takes - run.first_garment() as f64;
     let costs = [
         (Goal::Scans, takes * Fuse::SECONDS),
         (Goal::Body, Fit::SECONDS),

@@ -2,10 +2,15 @@
 
 use std::path::Path;
 
-use toile_capture::{LockedSubject, printable, subject::Layer};
+use toile_capture::{
+    LockedSubject, printable,
+    subject::{BODY, Layer},
+};
 use toile_garments::GarmentType;
 
-use crate::{Observer, PipelineError, Record, Settings, folders::Folders, resume::run_step, step::Step};
+use crate::{
+    Observer, PipelineError, Record, Settings, body_edits::BodyEdits, folders::Folders, resume::run_step, step::Step,
+};
 
 /// One run: where things are, what the layers are, how the stages are set, and who listens.
 pub struct Run<'a> {
@@ -22,6 +27,8 @@ pub struct Run<'a> {
     /// The type of the garment that each take added, where it is known; empty for a single file.
     garment_types: Vec<Option<GarmentType>>,
     name: String,
+    /// Said by the name of the first layer, or in `edits/body.json`.
+    is_first_dressed: bool,
 }
 
 impl<'a> Run<'a> {
@@ -51,21 +58,24 @@ impl<'a> Run<'a> {
             layers.truncate(count);
         }
         let name = subject.name().to_string();
-        Ok(Self {
-            folders: Folders::new(root),
-            layers,
-            settings,
-            observer,
-            subject: Some(subject),
-            garment_types,
-            name,
-        })
+        let folders = Folders::new(root);
+        let is_first_dressed = is_named_dressed(subject.layers()) || BodyEdits::of_subject(&folders)?.dressed;
+        Ok(Self { folders, layers, settings, observer, subject: Some(subject), garment_types, name, is_first_dressed })
     }
 
     /// Over a single file; records name paths relative to `root`.
     pub fn single(root: &Path, name: &str, settings: Settings, observer: &'a dyn Observer) -> Self {
         let (folders, name) = (Folders::new(root), name.to_string());
-        Self { folders, layers: Vec::new(), settings, observer, subject: None, garment_types: Vec::new(), name }
+        Self {
+            folders,
+            layers: Vec::new(),
+            settings,
+            observer,
+            subject: None,
+            garment_types: Vec::new(),
+            name,
+            is_first_dressed: false,
+        }
     }
 
     /// Runs a step where its record does not hold any more.
@@ -98,6 +108,26 @@ impl<'a> Run<'a> {
         self.layers.first().map_or("00-body", String::as_str)
     }
 
+    /// Whether the first take shows the person dressed: its layer is not called `body`, or `edits/body.json` says so.
+    pub fn is_first_dressed(&self) -> bool {
+        self.is_first_dressed
+    }
+
+    /// Number of the first take that gives a garment.
+    pub fn first_garment(&self) -> usize {
+        usize::from(!self.is_first_dressed)
+    }
+
+    /// Notes in `edits/body.json` that the first take shows the person dressed, for this run and all later ones.
+    ///
+    /// # Errors
+    /// [`PipelineError`] where the file cannot be read or written.
+    pub fn say_dressed(&mut self) -> Result<(), PipelineError> {
+        BodyEdits::say_dressed(&self.folders)?;
+        self.is_first_dressed = true;
+        Ok(())
+    }
+
     /// The name of the subject.
     pub fn title(&self) -> &str {
         &self.name
@@ -121,6 +151,11 @@ impl<'a> Run<'a> {
     }
 }
 
+/// Whether the first layer's name says that its take is dressed: only an undressed one is called `body`.
+fn is_named_dressed(layers: &[Layer]) -> bool {
+    layers.first().is_some_and(|layer| layer.name != BODY)
+}
+
 /// The types of all garments, by `subject.toml` or else by the layer's name; the body has none. A wrong one is found
 /// before any work is done.
 fn garment_types(root: &Path, layers: &[Layer]) -> Result<Vec<Option<GarmentType>>, PipelineError> {
@@ -128,7 +163,7 @@ fn garment_types(root: &Path, layers: &[Layer]) -> Result<Vec<Option<GarmentType
         let stated = layer.garment.as_deref().map(str::parse::<GarmentType>).transpose().map_err(|reason| {
             PipelineError::format(&root.join("subject.toml"), format!("layer {}: {reason}", layer.label()))
         })?;
-        Ok(stated.or_else(|| GarmentType::from_layer_name(&layer.name)).filter(|_| n > 0))
+        Ok(stated.or_else(|| GarmentType::from_layer_name(&layer.name)).filter(|_| n > 0 || is_named_dressed(layers)))
     };
     layers.iter().enumerate().map(of_layer).collect()
 }

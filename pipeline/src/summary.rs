@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 use serde_json::{Map, Value};
-use toile_fitting::FitReport;
+use toile_fitting::{FitReport, PartShown};
 use toile_fusion::FusionReport;
 use toile_garments::ExtractionReport;
 
 use crate::{
-    PipelineError, Record, json,
+    PipelineError, Record,
+    body_file::BodyFile,
+    json,
     step::Remarks,
     steps::{export::Exported, pose::PoseReport, read_scan::ScanReport, stack::Stacked},
 };
@@ -31,15 +33,27 @@ pub struct Summary {
     pub notes: Vec<String>,
 }
 
-/// Measurements of the body.
+/// Measurements of the body, as far as the scan shows it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Measured {
-    /// Standing straight, metres.
-    pub stature_m: f64,
+    /// Standing straight, metres; `None` where the scan shows a part of a person, without the floor.
+    pub stature_m: Option<f64>,
     /// Girths by name, metres.
     pub girths_m: BTreeMap<String, f64>,
-    /// Cubic metres.
-    pub volume_m3: f64,
+    /// Cubic metres; `None` where the scan shows a part of a person.
+    pub volume_m3: Option<f64>,
+}
+
+impl Measured {
+    /// Those of `body` that were measured; of a part of a person, girths above the scan's lower end only.
+    pub(crate) fn of(body: BodyFile, part: Option<&PartShown>) -> Self {
+        let BodyFile { stature_m, mut girths_m, girths, volume_m3, .. } = body;
+        let Some(part) = part else {
+            return Self { stature_m: Some(stature_m), girths_m, volume_m3: Some(volume_m3) };
+        };
+        girths_m.retain(|name, _| girths.get(name).is_some_and(|girth| girth.height_m > part.below_m));
+        Self { stature_m: None, girths_m, volume_m3: None }
+    }
 }
 
 /// The decisions of each step, as far as the run went.

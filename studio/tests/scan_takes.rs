@@ -72,6 +72,29 @@ fn two_scans_become_a_dressed_person_wherever_they_stand() {
 }
 
 #[test]
+fn a_person_who_was_scanned_in_clothes_only_gets_body_and_clothes() {
+    let dir = tempfile::tempdir().unwrap();
+    let (file, subject) = (dir.path().join("only.ply"), dir.path().join("ben"));
+    write_ply(&file, &person(true), 30.0);
+    let mut import = toile();
+    import.arg("import").arg(&file).arg("--subject").arg(&subject).args(["--layer", "shorts", "--dressed"]);
+    exits(0, &mut import);
+    let told = exits(0, toile().arg("extract").arg(&subject));
+    let warnings = told["warnings"].to_string();
+    assert!(warnings.contains("the person is dressed: shape and measures are estimated"), "{warnings}");
+    let cut = &told["results"]["stages"]["00-shorts/cut"];
+    let painted = person(true);
+    let is_blue = |t: usize| painted.triangles[t].iter().all(|&v| painted.colors[v as usize][2] == 160);
+    let blue = painted.filter_triangles(is_blue).0;
+    let area = cut["area_m2"].as_f64().unwrap();
+    assert!((area / blue.area() - 1.0).abs() < 0.15, "{area} of {}", blue.area());
+    // under the shorts the body has skin, not their paint
+    let body = ply::read(&subject.join("build/body/body.ply")).unwrap();
+    let painted_blue = body.colors.iter().filter(|c| c[2] > 120 && c[0] < 100).count();
+    assert!(50 * painted_blue < body.colors.len(), "{painted_blue} vertices of the body are blue");
+}
+
+#[test]
 fn a_retake_keeps_the_old_scan_and_wrong_words_change_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let (file, subject) = (dir.path().join("body.ply"), dir.path().join("ann"));

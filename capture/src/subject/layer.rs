@@ -4,13 +4,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::printable;
 
-/// Name of the layer of take 0, as soon as the takes are in the order in which garments are put on.
+/// Name of the layer of take 0, unless the person is dressed in it, as soon as the takes are in the order in which garments are
+/// put on.
 pub const BODY: &str = "body";
 
 /// The addition of a take, in the order of the takes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
-    /// Number of the take: 0 is the body.
+    /// Number of the take: 0 is the body, or where that was never recorded undressed, the first clothes.
     #[serde(skip)]
     pub number: usize,
     /// Name without the number: `body`, `trousers`.

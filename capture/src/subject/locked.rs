@@ -104,9 +104,34 @@ impl LockedSubject {
                  a number"
             ));
         }
-        let layer = Layer::new(number, name, garment);
+        Ok(self.pending(Layer::new(number, name, garment)))
+    }
+
+    /// The first take of a subject that was never recorded undressed: it shows the person in what `name` says, of type
+    /// `garment`.
+    ///
+    /// # Errors
+    /// [`CaptureError`] where the name is unusable or `body`, or there are takes already.
+    pub fn dressed_take(&self, name: &str, garment: Option<&str>) -> Result<PendingTake, CaptureError> {
+        let wrong = |reason: String| Err(CaptureError::format(self.folder(), reason));
+        let (_, name) = split_number(name);
+        check_name(name).map_err(|reason| CaptureError::format(self.folder(), reason))?;
+        if !self.layers().is_empty() {
+            return wrong(
+                "--dressed is of the first take only, and the subject has takes already: leave it out".into(),
+            );
+        }
+        if name == BODY {
+            return wrong(
+                "a dressed take is not called `body`: name it after what is worn, such as --layer clothes".into(),
+            );
+        }
+        Ok(self.pending(Layer::new(0, name, garment)))
+    }
+
+    fn pending(&self, layer: Layer) -> PendingTake {
         let path = self.take_path(&layer);
-        Ok(PendingTake { layer, path, rig: String::new(), source: String::new(), retake: false })
+        PendingTake { layer, path, rig: String::new(), source: String::new(), retake: false }
     }
 
     /// A new take of an existing layer: only when it is accepted does the old one move to `takes/rejected/`.

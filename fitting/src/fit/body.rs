@@ -9,12 +9,14 @@ use super::{
     choose::best_start,
     fingers::fit_fingers,
     guides::Guides,
+    part::{believed, is_suspected},
+    placement::Extent,
     prepare::{Mend, Prepared, prepare},
     report::{FitReport, Verdict},
     resolution::{Resolutions, Sampled},
     seed::{seed_fit, seed_start},
     starts::{Start, starts},
-    verdict::judge,
+    verdict::{Asked, judge},
 };
 use crate::{
     FitSettings, FittingError, HandLandmarks, Method, ScanLandmark,
@@ -62,6 +64,10 @@ impl BodyFit {
     }
 }
 
+/// Misfit of a head with hair, metres: hair of ordinary cut stands 5 to 20 mm off half of it. Where a floor tells the stature this
+/// does not matter; where only the upper part of a person is seen, a head that is fitted into its hair makes a giant.
+const HAIR: f64 = 0.010;
+
 /// Turns below this are rounding, radians.
 const UPRIGHT: f64 = 1e-9;
 
@@ -71,7 +77,9 @@ const UPRIGHT: f64 = 1e-9;
 /// up axes are mended with a notice, see [`BodyFit::mend`]). The vertex attribute `filled` (1 where nothing was seen)
 /// lowers trust. Source: Hu et al. 2017, eq. 4, as Gauss–Newton on robust point-to-plane distances in both directions
 /// with analytic derivatives, coarse to fine ([`Method::Toile`]), or as the paper prints it ([`Method::Seed`]).
-/// Landmarks that were set by hand drive the pose, too (Magnenat-Thalmann et al. 2004, §3.1). Same result for any number of threads.
+/// Landmarks that were set by hand drive the pose, too (Magnenat-Thalmann et al. 2004, §3.1). A scan of the upper part of a person
+/// (head, shoulders and most of the trunk at least) gives a body whose rest is that of an ordinary person, with
+/// [`FitReport::part`] set. Same result for any number of threads.
 ///
 /// # Errors
 /// [`FittingError`] where the mesh cannot be a person or leaves the body undetermined. A fit that should not be
@@ -90,63 +98,95 @@ pub fn fit_body(
     let trust = trust_of(&prepared.mesh);
     let by_hand = set_by_hand(model, settings, prepared.scale, &prepared.mesh)?;
     let lying = Bvh::new(&prepared.mesh.positions, &prepared.mesh.triangles);
-    let best = started(model, &prepared, (&trust, &lying), &Guides::new(model, &by_hand), settings, progress)?;
-    let (scan, state, mend) = stand(&prepared, model, best.state, best.up);
-    let by_hand = turned(by_hand, &mend.rotation);
-    progress(0.45);
-    let mut fine = match settings.method {
-        Method::Toile => {
-            let guides = Guides::new(model, &by_hand);
-            refine(model, (&scan, &trust), &guides, settings, state, best.is_usual)?
-        }
-        Method::Seed => seed_fit(model, &scan, &trust, settings, state)?,
-    };
-    fine.iterations += best.iterations;
-    if settings.method == Method::Toile {
-        fine.state = fit_fingers(model, &scan, &trust, fine.state)?;
+    let fitter = Fitter { model, prepared: &prepared, trust: &trust, lying: &lying, by_hand: &by_hand, settings };
+    let whole = fitter.fit(Extent::Whole, progress)?;
+    if settings.method == Method::Seed || !is_suspected(&whole, &prepared.mesh) {
+        return Ok(whole);
     }
-    progress(0.7);
-    let is_upright = mend.rotation == UnitQuaternion::identity();
-    let bvh = if is_upright { lying } else { Bvh::new(&scan.positions, &scan.triangles) };
-    let astray = Astray::of_fit(model, (&scan, &trust, &bvh), settings, &fine.state)?;
-    let landmarks = landmarks(model, &fine.state, &scan, &bvh, &trust, &by_hand);
-    let points = conform(model, &fine.state, &scan, &bvh, &trust, settings, &landmarks)?;
-    progress(0.95);
-    let body = at_rest(model, &fine.state, &points);
-    let measurements = measured(model, &body, &fine.state.pose);
-    let (mut report, seen) = judge(model, (&scan, &trust), &fine, &points, &measurements, &astray, settings.dressed);
-    report.notices.splice(0..0, notices(prepared.notices, &mend));
-    progress(1.0);
-    let State { pose, beta } = fine.state;
-    let model_mesh = template(model, model.posed(&beta, &pose));
-    let skeleton = body.skeleton.clone();
-    Ok(BodyFit { beta, pose, skeleton, body, model_mesh, mend, landmarks, measurements, seen, report })
+    Ok(believed(whole, fitter.fit(Extent::FromCrown, &|_| {})?))
 }
 
-/// The state from which a scan is fitted finely.
-fn started(
-    model: &BodyModel,
-    prepared: &Prepared,
-    (trust, bvh): (&[f32], &Bvh),
-    guides: &Guides,
-    settings: &FitSettings,
-    progress: &(dyn Fn(f32) + Sync),
-) -> Result<Start, FittingError> {
-    let (scan, ups) = (&prepared.mesh, &prepared.ups);
-    match settings.method {
-        Method::Toile => {
-            let resolutions = Resolutions::new(settings);
-            let starts = starts(model, scan, trust, ups, guides, settings.headings, resolutions.coarse)?;
-            progress(0.25);
-            best_start(model, (scan, trust, bvh), guides, settings, starts, &resolutions)
+/// What a fit starts from.
+struct Fitter<'a> {
+    model: &'a BodyModel,
+    prepared: &'a Prepared,
+    trust: &'a [f32],
+    /// Over the scan as it lies.
+    lying: &'a Bvh,
+    by_hand: &'a HandLandmarks,
+    settings: &'a FitSettings,
+}
+
+impl Fitter<'_> {
+    /// The fit to a scan that is taken to show `extent` of a person.
+    fn fit(&self, extent: Extent, progress: &(dyn Fn(f32) + Sync)) -> Result<BodyFit, FittingError> {
+        let Self { model, trust, .. } = *self;
+        let settings = &of_extent(self.settings, extent);
+        let best = self.started(extent, progress)?;
+        let (scan, state, mend) = stand(self.prepared, model, best.state, best.up);
+        let by_hand = turned(self.by_hand, &mend.rotation);
+        progress(0.45);
+        let mut fine = match settings.method {
+            Method::Toile => {
+                let guides = Guides::new(model, &by_hand);
+                refine(model, (&scan, trust), &guides, settings, state, best.is_usual)?
+            }
+            Method::Seed => seed_fit(model, &scan, trust, settings, state)?,
+        };
+        fine.iterations += best.iterations;
+        if settings.method == Method::Toile {
+            fine.state = fit_fingers(model, &scan, trust, fine.state)?;
         }
-        Method::Seed => seed_start(model, scan, trust, ups, settings),
+        progress(0.7);
+        let standing = mend.rotation.angle() > 0.0;
+        let standing = standing.then(|| Bvh::new(&scan.positions, &scan.triangles));
+        let bvh = standing.as_ref().unwrap_or(self.lying);
+        let astray = Astray::of_fit(model, (&scan, trust, bvh), settings, &fine.state)?;
+        let landmarks = landmarks(model, &fine.state, &scan, bvh, trust, &by_hand);
+        let points = conform(model, &fine.state, &scan, bvh, trust, settings, &landmarks)?;
+        progress(0.95);
+        let body = at_rest(model, &fine.state, &points);
+        let measurements = measured(model, &body, &fine.state.pose);
+        let dressed = settings.dressed;
+        let asked = Asked { extent, dressed };
+        let (mut report, seen) = judge(model, (&scan, trust), &fine, &points, &measurements, &astray, asked);
+        report.notices.splice(0..0, notices(self.prepared.notices.clone(), &mend));
+        progress(1.0);
+        let State { pose, beta } = fine.state;
+        let model_mesh = template(model, model.posed(&beta, &pose));
+        let skeleton = body.skeleton.clone();
+        Ok(BodyFit { beta, pose, skeleton, body, model_mesh, mend, landmarks, measurements, seen, report })
     }
+
+    /// The state from which a scan is fitted finely.
+    fn started(&self, extent: Extent, progress: &(dyn Fn(f32) + Sync)) -> Result<Start, FittingError> {
+        let Self { model, settings, trust, lying: bvh, .. } = *self;
+        let scan = &self.prepared.mesh;
+        // a part's longest side need not be its height, and upside down less of the body would be left over
+        let upright = [UnitQuaternion::identity()];
+        let ups = if extent == Extent::Whole { &self.prepared.ups[..] } else { &upright };
+        match settings.method {
+            Method::Toile => {
+                let (guides, resolutions) = (Guides::new(model, self.by_hand), Resolutions::new(settings));
+                let (headings, coarse) = (settings.headings, resolutions.coarse);
+                let starts = starts(model, (scan, trust), ups, extent, &guides, headings, coarse)?;
+                progress(0.25);
+                best_start(model, (scan, trust, bvh), &guides, settings, (starts, extent), &resolutions)
+            }
+            Method::Seed => seed_start(model, scan, trust, ups, settings),
+        }
+    }
+}
+
+/// The settings for a scan that shows `extent` of a person.
+fn of_extent(settings: &FitSettings, extent: Extent) -> FitSettings {
+    let noise = if extent == Extent::FromCrown { settings.noise.max(HAIR) } else { settings.noise };
+    FitSettings { noise, ..settings.clone() }
 }
 
 /// Landmarks in a frame that is turned by `rotation`.
-fn turned(landmarks: HandLandmarks, rotation: &UnitQuaternion<f64>) -> HandLandmarks {
-    landmarks.into_iter().map(|(name, p)| (name, (rotation * Point3::from(p)).into())).collect()
+fn turned(landmarks: &HandLandmarks, rotation: &UnitQuaternion<f64>) -> HandLandmarks {
+    landmarks.iter().map(|(name, p)| (name.clone(), (rotation * Point3::from(*p)).into())).collect()
 }
 
 /// Turns scan and state upright.
@@ -189,7 +229,7 @@ fn template(model: &BodyModel, points: Vec<Point3<f32>>) -> Mesh {
 }
 
 /// The body whose skin lies at `points` in the scan's pose, taken back to rest.
-fn at_rest(model: &BodyModel, state: &State, points: &[Point3<f32>]) -> SkinnedMesh {
+pub(super) fn at_rest(model: &BodyModel, state: &State, points: &[Point3<f32>]) -> SkinnedMesh {
     let skeleton = model.skeleton_at(&state.beta);
     let rest = skinning::unskin(points, &model.weights, &state.pose.skinning_transforms(&skeleton));
     SkinnedMesh { mesh: template(model, rest), skeleton, weights: model.weights.clone() }
@@ -200,7 +240,7 @@ const ARM_CLEAR: f64 = 0.906;
 
 /// Stature of the body standing straight, girths as it stood in the scan: skin around hips and armpits keeps its shape
 /// there. Arms that hang down would join the section, so that they are lifted to the A-pose first.
-fn measured(model: &BodyModel, body: &SkinnedMesh, pose: &Pose) -> Measurements {
+pub(super) fn measured(model: &BodyModel, body: &SkinnedMesh, pose: &Pose) -> Measurements {
     use Joint::*;
     let stature = stature(&standing(body), &model.inner);
     let joints = pose.joint_positions(&body.skeleton);

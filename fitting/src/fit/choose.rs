@@ -8,6 +8,7 @@ use super::{
     astray::Astray,
     guides::Guides,
     hands::turned_hands,
+    placement::Extent,
     problem::BodyProblem,
     resolution::{Resolutions, Sampled},
     search::{Depths, Search, searched},
@@ -25,7 +26,8 @@ const FOUND_COMPARED: usize = 5;
 /// Height over longest side of a scan from which on it is taken to stand on +Y, as documented, whatever its pose.
 const STANDS: f32 = 0.5;
 
-/// Takes the best starts to the resolution at which front and back differ, and keeps the one that agrees best.
+/// Takes the best starts to the resolution at which front and back differ, and keeps the one that agrees best. Limbs are not
+/// searched under clothes, nor where a scan shows only a part of a person.
 ///
 /// # Errors
 /// [`FittingError`] where the scan has no surface or leaves the pose undetermined.
@@ -34,7 +36,7 @@ pub(crate) fn best_start(
     (scan, trust, bvh): (&Mesh, &[f32], &Bvh),
     guides: &Guides,
     settings: &FitSettings,
-    starts: Vec<Start>,
+    (starts, extent): (Vec<Start>, Extent),
     resolutions: &Resolutions,
 ) -> Result<Start, FittingError> {
     let sampled = Sampled::new(model, scan, trust, guides, resolutions.heading)?;
@@ -45,7 +47,7 @@ pub(crate) fn best_start(
     best.iterations += iterations;
     let astray = Astray::new(model, &sampled, &problem, bvh, &best.state);
     // clothes stand off everywhere, which is no limb in another place
-    if settings.dressed || !astray.is_wrong() {
+    if settings.dressed || extent == Extent::FromCrown || !astray.is_wrong() {
         best.state = turned_hands(model, &sampled, best.state);
         return Ok(best);
     }

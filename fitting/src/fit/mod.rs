@@ -2,6 +2,7 @@
 
 mod arms;
 mod astray;
+mod bare;
 mod body;
 mod choose;
 mod evidence;
@@ -9,6 +10,7 @@ mod fingers;
 mod guides;
 mod hands;
 mod matches;
+mod part;
 mod placement;
 mod prepare;
 mod problem;
@@ -24,7 +26,9 @@ pub(crate) use fingers::fit_hands_again;
 pub(crate) use problem::BodyProblem;
 pub(crate) use search::{Depths, Search};
 pub use {
+    bare::take_on_bare_skin,
     body::{BodyFit, fit_body},
+    part::PartShown,
     prepare::Mend,
     report::{DistanceStats, FitReport, Verdict},
     upright::find_upright,

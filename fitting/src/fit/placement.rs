@@ -1,4 +1,5 @@
-//! Where the model stands before anything is fitted: on the scan's floor, in its middle, as tall as it.
+//! Where the model stands before anything is fitted: on the scan's floor, in its middle, as tall as it; or with its crown at the
+//! scan's top, where the scan shows the upper part of a person.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use toile_character::{BodyModel, Joint, Pose};
@@ -11,6 +12,15 @@ const STRAY: usize = 2000;
 /// Farthest that a coefficient is set to meet the height, standard deviations.
 const FARTHEST_BETA: f64 = 3.0;
 
+/// How much of a person a scan is taken to show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Extent {
+    /// All of it: the scan is as tall as the person.
+    Whole,
+    /// From the crown down to where the scan ends.
+    FromCrown,
+}
+
 /// Where the model has to stand for one way up.
 pub(crate) struct Placement {
     /// Coefficients that give the model the scan's height.
@@ -21,14 +31,22 @@ pub(crate) struct Placement {
 }
 
 impl Placement {
-    /// `up` turns the scan upright; the model gets `components` coefficients.
-    pub fn new(model: &BodyModel, scan: &Mesh, up: &UnitQuaternion<f64>, components: usize) -> Self {
+    /// `up` turns the scan upright; the model gets `components` coefficients. One that hangs from the crown is an average
+    /// person.
+    pub fn new(model: &BodyModel, scan: &Mesh, up: &UnitQuaternion<f64>, components: usize, extent: Extent) -> Self {
         let points: Vec<Point3<f64>> = scan.positions.iter().map(|p| up * p.cast::<f64>()).collect();
         let (low, high) = height_range(&points);
         let areas = vertex_areas(scan);
         let total: f64 = areas.iter().map(|&a| f64::from(a)).sum::<f64>().max(1e-12);
         let sum: Vector3<f64> = points.iter().zip(&areas).map(|(p, &a)| p.coords * f64::from(a)).sum();
-        Self { beta: beta_of_height(model, high - low, components), floor: low, middle: (sum.x / total, sum.z / total) }
+        let middle = (sum.x / total, sum.z / total);
+        match extent {
+            Extent::Whole => Self { beta: beta_of_height(model, high - low, components), floor: low, middle },
+            Extent::FromCrown => {
+                let crown = model.mean.iter().fold(0.0, |top, p| f64::max(top, f64::from(p.y)));
+                Self { beta: vec![0.0; components], floor: high - crown, middle }
+            }
+        }
     }
 
     /// The model at `heading`, upper arms turned by `arms` away from the A-pose (radians, positive raises them), in the

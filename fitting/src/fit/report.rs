@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::part::PartShown;
+
 /// Whether a fit is to be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -60,6 +62,12 @@ pub struct FitReport {
     pub shape_rms: f64,
     /// Shape and measures are estimated: the person was dressed.
     pub estimated: bool,
+    /// The upper part of a person that the scan shows; `None` where it was taken to show a whole one.
+    #[serde(default)]
+    pub part: Option<PartShown>,
+    /// The scan shows a part of a person that is too little for a body.
+    #[serde(default)]
+    pub is_too_little: bool,
     /// Share of each region's outer surface that the scan covers, 0–1, as `body_covered`.
     pub region_covered: BTreeMap<String, f64>,
 }

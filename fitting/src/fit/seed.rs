@@ -11,7 +11,7 @@ use toile_geometry::Mesh;
 
 use super::{
     guides::Guides,
-    placement::Placement,
+    placement::{Extent, Placement},
     resolution::{Resolutions, Sampled},
     starts::Start,
 };
@@ -39,7 +39,8 @@ pub(crate) fn seed_start(
         (0..ups.len()).flat_map(|up| (0..settings.headings).map(move |h| (up, h))).collect();
     let coarse_fit = |(up, h): (usize, usize)| -> Result<Start, FittingError> {
         let heading = TAU * h as f64 / settings.headings as f64;
-        let state = Placement::new(model, scan, &ups[up], sampled.components).state(model, heading, 0.0, &ups[up]);
+        let place = Placement::new(model, scan, &ups[up], sampled.components, Extent::Whole);
+        let state = place.state(model, heading, 0.0, &ups[up]);
         let end = descend(&problem, state, coarse.iterations)?;
         Ok(Start {
             misfit: problem.mean_distance(&end.state),

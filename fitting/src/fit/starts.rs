@@ -10,7 +10,7 @@ use toile_geometry::Mesh;
 use super::{
     arms::found_arms,
     guides::Guides,
-    placement::Placement,
+    placement::{Extent, Placement},
     problem::BodyProblem,
     resolution::{Resolution, Sampled},
 };
@@ -38,15 +38,16 @@ pub(crate) struct Start {
     pub is_usual: bool,
 }
 
-/// The best coarse fits, best first. `ups` are the rotations that may turn the scan upright.
+/// The best coarse fits to a scan that shows `extent` of a person, best first. `ups` are the rotations that may turn the scan
+/// upright.
 ///
 /// # Errors
 /// [`FittingError`] where the scan has no surface or leaves the pose undetermined.
 pub(crate) fn starts(
     model: &BodyModel,
-    scan: &Mesh,
-    trust: &[f32],
+    (scan, trust): (&Mesh, &[f32]),
     ups: &[UnitQuaternion<f64>],
+    extent: Extent,
     guides: &Guides,
     headings: usize,
     coarse: Resolution,
@@ -61,7 +62,7 @@ pub(crate) fn starts(
         again.iterations += first.iterations;
         Ok(if again.misfit < first.misfit { again } else { first })
     };
-    let candidates = candidates(model, scan, &problem, ups, headings)?;
+    let candidates = candidates(model, (scan, extent), &problem, ups, headings)?;
     let mut refined = candidates.into_par_iter().map(coarse_fit).collect::<Result<Vec<_>, _>>()?;
     refined.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
     Ok(refined)
@@ -75,13 +76,13 @@ fn ended(problem: &BodyProblem, up: UnitQuaternion<f64>, end: Descent) -> Start 
 /// each heading and up, of these the most promising few.
 fn candidates(
     model: &BodyModel,
-    scan: &Mesh,
+    (scan, extent): (&Mesh, Extent),
     problem: &BodyProblem,
     ups: &[UnitQuaternion<f64>],
     headings: usize,
 ) -> Result<Vec<Start>, FittingError> {
     let components = problem.columns.betas;
-    let places: Vec<Placement> = ups.iter().map(|up| Placement::new(model, scan, up, components)).collect();
+    let places: Vec<Placement> = ups.iter().map(|up| Placement::new(model, scan, up, components, extent)).collect();
     let turns: Vec<(usize, usize)> = (0..ups.len()).flat_map(|u| (0..headings).map(move |h| (u, h))).collect();
     let judged = |(up, h): (usize, usize)| -> Result<Start, FittingError> {
         let heading = TAU * h as f64 / headings as f64;

@@ -7,6 +7,7 @@ use toile_geometry::{Mesh, bvh::Bvh};
 use super::{
     choose::best_start,
     guides::Guides,
+    placement::Extent,
     prepare::{Prepared, prepare},
     resolution::Resolutions,
     starts::starts,
@@ -31,9 +32,9 @@ pub fn find_upright(
     let by_hand = HandLandmarks::default();
     let guides = Guides::new(model, &by_hand);
     let resolutions = Resolutions::new(settings);
-    let starts = starts(model, &mesh, &trust, &ups, &guides, settings.headings, resolutions.coarse)?;
+    let starts = starts(model, (&mesh, &trust), &ups, Extent::Whole, &guides, settings.headings, resolutions.coarse)?;
     let bvh = Bvh::new(&mesh.positions, &mesh.triangles);
-    Ok(best_start(model, (&mesh, &trust, &bvh), &guides, settings, starts, &resolutions)?.up)
+    Ok(best_start(model, (&mesh, &trust, &bvh), &guides, settings, (starts, Extent::Whole), &resolutions)?.up)
 }
 
 #[cfg(test)]

@@ -7,6 +7,8 @@ use toile_geometry::Mesh;
 use super::{
     astray::Astray,
     evidence::{Coverage, Distances, samples},
+    part::PartShown,
+    placement::Extent,
     report::{FitReport, Verdict},
 };
 use crate::{
@@ -26,6 +28,8 @@ struct Reach {
 const SKIN: Reach = Reach { explained: 0.02, covered: 0.015 };
 /// Under clothes: as far as a coat or a wide skirt stands off.
 const CLOTHES: Reach = Reach { explained: 0.10, covered: 0.10 };
+/// Scan and bare skin belong together within this, metres.
+pub(crate) const SKIN_COVERED: f32 = SKIN.covered;
 /// A region of which a smaller share than this was scanned is estimated.
 const BARELY_SEEN: f64 = 0.3;
 /// A region of which a smaller share than this was scanned is not in the scan: noise and neighbours reach that far over its border.
@@ -113,6 +117,54 @@ const UNDER_CLOTHES: [Rule; 8] = [
     STATURE,
     Rule { doubtful: Bounds::Above(1.6), failed: Bounds::Above(2.0), ..UNUSUAL },
 ];
+
+/// The upper part of a person. Of a person's scan less is known, so that more is asked of it: the face lies on the scan, and
+/// nothing of the scan is left over.
+const OF_PART: [Rule; 8] = [
+    Rule { doubtful: Bounds::Below(0.97), failed: Bounds::Below(0.93), ..EXPLAINED },
+    LIMB_BURIED,
+    Rule { doubtful: Bounds::Below(0.80), failed: Bounds::Below(0.60), ..PART_COVERED },
+    Rule { doubtful: Bounds::Below(0.75), failed: Bounds::Below(0.60), ..HEAD },
+    Rule { doubtful: Bounds::Above(0.010), failed: Bounds::Above(0.020), ..MODEL_DISTANCE },
+    STATURE,
+    Rule { doubtful: Bounds::Above(1.6), failed: Bounds::Above(2.0), ..UNUSUAL },
+    PART_SHOWN,
+];
+
+/// The same of a dressed person.
+const OF_DRESSED_PART: [Rule; 8] = [
+    Rule { doubtful: Bounds::Below(0.97), failed: Bounds::Below(0.93), ..EXPLAINED },
+    Rule { doubtful: Bounds::Below(0.80), failed: Bounds::Below(0.60), ..PART_COVERED },
+    Rule { doubtful: Bounds::Below(0.75), failed: Bounds::Below(0.60), ..HEAD },
+    Rule { doubtful: Bounds::Above(0.030), failed: Bounds::Above(0.040), ..MODEL_DISTANCE },
+    STATURE,
+    Rule { doubtful: Bounds::Above(1.6), failed: Bounds::Above(2.0), ..UNUSUAL },
+    PART_SHOWN,
+    DRESSED,
+];
+
+/// The trunk's share from which on a body is fitted: shoulders and chest, and some of the waist.
+const ENOUGH: f64 = 0.55;
+/// The body goes on below the scan's lower end by this much at least, metres; else the scan shows a whole person, or none.
+const CUT_OFF: f64 = 0.25;
+
+const PART_COVERED: Rule = Rule {
+    value: |e| e.report.part.as_ref().map_or(0.0, |part| part.covered),
+    doubtful: Bounds::Never,
+    failed: Bounds::Never,
+    reason: |e| {
+        let covered = 100.0 * e.report.part.as_ref().map_or(0.0, |part| part.covered);
+        format!("the scan covers {covered:.0} % of the body above its lower end: is it the upper part of a person?")
+    },
+};
+
+/// Always worth a sentence; a fault where nothing is cut off.
+const PART_SHOWN: Rule = Rule {
+    value: |e| e.report.part.as_ref().map_or(0.0, |part| part.below_m),
+    doubtful: Bounds::Above(0.0),
+    failed: Bounds::Below(CUT_OFF),
+    reason: |e| e.report.part.as_ref().map_or_else(String::new, PartShown::sentence),
+};
 
 const EXPLAINED: Rule = Rule {
     value: |e| e.report.scan_explained,
@@ -267,6 +319,15 @@ impl Bounds {
     }
 }
 
+/// What a fit was asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Asked {
+    /// How much of a person the scan is taken to show.
+    pub extent: Extent,
+    /// The person is dressed.
+    pub dressed: bool,
+}
+
 /// Measures a fit and judges it; the report, and of each vertex whether the scan shows its skin. `points` is the conformed body in
 /// the scan's pose, `scan` has normals.
 pub(crate) fn judge(
@@ -276,7 +337,7 @@ pub(crate) fn judge(
     points: &[Point3<f32>],
     measurements: &Measurements,
     astray: &Astray,
-    dressed: bool,
+    Asked { extent, dressed }: Asked,
 ) -> (FitReport, Vec<bool>) {
     let reach = if dressed { CLOTHES } else { SKIN };
     let State { beta, pose } = &fine.state;
@@ -285,6 +346,7 @@ pub(crate) fn judge(
     let skin = Coverage::new(model, points, scan, trust, SKIN.covered);
     let clothed = dressed.then(|| Coverage::new(model, points, scan, trust, CLOTHES.covered));
     let covered = clothed.as_ref().unwrap_or(&skin);
+    let shown = || PartShown::new(model, &fine.state, points, &covered.seen, (scan, trust));
     let mut report = FitReport {
         verdict: Verdict::Trusted,
         reasons: Vec::new(),
@@ -301,6 +363,8 @@ pub(crate) fn judge(
         head_covered: skin.of(Region::Head),
         shape_rms: (beta.iter().map(|b| b * b).sum::<f64>() / beta.len().max(1) as f64).sqrt(),
         estimated: dressed,
+        part: (extent == Extent::FromCrown).then(shown),
+        is_too_little: false,
         region_covered: covered.regions.clone(),
     };
     decide(&mut report, measurements.stature_m);
@@ -316,7 +380,12 @@ fn decide(report: &mut FitReport, stature: f64) {
     let evidence = Evidence { report, hidden: &large, unseen: &unseen, stature };
     let mut verdict = Verdict::Trusted;
     let mut reasons = Vec::new();
-    let rules: &[Rule] = if report.estimated { &UNDER_CLOTHES } else { &ON_SKIN };
+    let rules: &[Rule] = match (report.estimated, report.part.is_some()) {
+        (false, false) => &ON_SKIN,
+        (true, false) => &UNDER_CLOTHES,
+        (false, true) => &OF_PART,
+        (true, true) => &OF_DRESSED_PART,
+    };
     for rule in rules {
         let value = (rule.value)(&evidence);
         let has_failed = rule.failed.is_exceeded(value);
@@ -325,11 +394,26 @@ fn decide(report: &mut FitReport, stature: f64) {
             reasons.push((rule.reason)(&evidence));
         }
     }
-    let expected = usize::from(report.estimated);
+    let expected = usize::from(report.estimated) + usize::from(report.part.is_some());
     report.verdict = if reasons.len() >= TOO_MANY_DOUBTS + expected { Verdict::Failed } else { verdict };
     report.reasons = reasons;
+    refuse_too_little(report);
     if !small.is_empty() {
         report.notices.push(barely_seen(&small));
+    }
+}
+
+/// A part of a person that shows too little of the trunk gives no body, and says so in place of everything else.
+fn refuse_too_little(report: &mut FitReport) {
+    let Some(part) = report.part.as_ref().filter(|part| part.trunk_covered < ENOUGH) else { return };
+    report.is_too_little = report.verdict != Verdict::Failed;
+    report.verdict = Verdict::Failed;
+    if report.is_too_little {
+        report.reasons = vec![format!(
+            "the scan shows a person from the {} up, which is too little for a body: neither its size nor its shape can be \
+             told; scan the person from the hips up at least",
+            part.from
+        )];
     }
 }
 
@@ -363,6 +447,8 @@ mod tests {
             head_covered: 0.9,
             shape_rms: 1.0,
             estimated,
+            part: None,
+            is_too_little: false,
             region_covered: [("left hand".into(), 0.1), ("torso".into(), 0.9)].into(),
         }
     }

@@ -20,6 +20,8 @@ use crate::{
 
 /// Distance between the points of a tape at which the skin is looked up, metres.
 const ALONG: f64 = 0.01;
+/// A tape of which a smaller share was seen was not.
+const SHOWN: f64 = 0.5;
 /// The skin that matters around the end of a straight measurement, metres: about the size of a landmark's neighbourhood.
 const AROUND: f32 = 0.025;
 
@@ -34,6 +36,9 @@ pub struct ErrorModel {
     pub per_distance: f64,
     /// In place of all others where the person was dressed.
     pub dressed_mm: f64,
+    /// In place of all others where the scan ends above it: how much people differ (`examples/population.rs`).
+    #[serde(default)]
+    pub population_mm: f64,
 }
 
 impl ErrorModel {
@@ -71,15 +76,32 @@ pub(crate) fn weigh(measures: &mut [BodyMeasure], standing: &Mesh, fit: &BodyFit
     let skin = Skin { bvh: Bvh::new(&standing.positions, &standing.triangles), standing, seen: &fit.seen };
     let distance = fit.report.scan_to_body.median_mm;
     for measure in measures {
-        let seen = skin.seen_under(measure);
+        let is_cut_off = fit.report.part.as_ref().is_some_and(|part| is_below(measure, &skin, part.below_m));
+        let seen = if is_cut_off { 0.0 } else { skin.seen_under(measure) };
         measure.seen = Some(seen);
         let model = models.measures.get(sideless(&measure.name));
-        measure.uncertainty_m = model.map(|model| {
-            if fit.report.estimated { 1e-3 * model.dressed_mm } else { model.half_interval_m(seen, distance) }
+        measure.uncertainty_m = model.map(|model| match () {
+            () if is_cut_off => 1e-3 * model.population_mm,
+            () if fit.report.estimated => 1e-3 * model.dressed_mm,
+            () => model.half_interval_m(seen, distance),
         });
-        measure.doubt =
-            measure.uncertainty_m.filter(|&u| u > MEASURED).map(|u| estimated(measure, u, fit.report.estimated));
+        measure.doubt = if is_cut_off {
+            Some(cut_off(measure))
+        } else {
+            measure.uncertainty_m.filter(|&u| u > MEASURED).map(|u| estimated(measure, u, fit.report.estimated))
+        };
     }
+}
+
+/// Whether a scan that ends `height` metres over the soles does not show what `measure` measures: every height starts at the
+/// floor, and other tapes lie on skin below, unless it was seen (an arm that was held up).
+fn is_below(measure: &BodyMeasure, skin: &Skin, height: f64) -> bool {
+    let lowest = measure.path.iter().fold(f64::INFINITY, |low, p| low.min(p[1]));
+    measure.kind == MeasureKind::Height || (lowest < height && skin.seen_under(measure) < SHOWN)
+}
+
+fn cut_off(measure: &BodyMeasure) -> String {
+    format!("{} was not seen: the scan ends above it, and the value is that of an ordinary body", measure.name)
 }
 
 fn estimated(measure: &BodyMeasure, half_interval: f64, is_dressed: bool) -> String {

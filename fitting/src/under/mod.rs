@@ -11,6 +11,7 @@ mod seed;
 mod settle;
 mod worn;
 
+pub(crate) use {contain::contained, inside::Inside};
 pub use {
     pose::pose_under,
     report::{UnderFit, UnderReport},

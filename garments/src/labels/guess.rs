@@ -36,7 +36,12 @@ const BACK_COVERED: f32 = 0.6;
 /// The type, from the covered parts, the cloth along the inner thighs and whether the front is open.
 pub(super) fn guess_type(on: &Measured, labels: &Labels) -> GarmentType {
     let covered = covered_shares(on, |v| labels.garment[v]);
-    fitting_type(&covered, inner_thighs(on.take, labels), front_is_open(on.take, labels))
+    let thighs = inner_thighs(on.take, labels);
+    if on.take.is_first && covered[BodyPart::Torso as usize] > COVERS_TORSO && thighs > LEGS_APART {
+        // all that a person wears, trousers and whatever is above them
+        return GarmentType::Other;
+    }
+    fitting_type(&covered, thighs, front_is_open(on.take, labels))
 }
 
 /// True where one piece covers the torso and each leg separately, or where large pieces cover different parts: a pair of

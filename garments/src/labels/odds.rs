@@ -2,7 +2,7 @@
 
 use toile_character::GarmentType;
 
-use super::{template, types::Labels};
+use super::{bare, template, types::Labels};
 use crate::measure::{Measured, color::Histogram, scan_graph::ScanGraph};
 
 /// Where nothing was seen, evidence counts this much.
@@ -17,6 +17,9 @@ const LIMIT: f32 = 7.0;
 /// Log odds for a garment of a type. The colours of `earlier` labels are used where there are any (Rother et al. 2004,
 /// GrabCut, on a surface).
 pub(super) fn log_odds(on: &Measured, garment_type: GarmentType, earlier: Option<&Labels>) -> Vec<f32> {
+    if on.take.is_first {
+        return bare::log_odds(on, earlier);
+    }
     let (graph, evidence) = (&on.graph, &on.evidence);
     let prior = template::log_odds(garment_type);
     let colors = earlier.map_or_else(|| vec![0.0; graph.len()], |l| color_model(graph, l));

@@ -77,6 +77,7 @@ pub fn person() -> Person {
 pub fn take<'a>(person: &'a Person, scan: &'a Mesh, previous: &'a Mesh, pose: &'a Pose) -> DressedTake<'a> {
     DressedTake {
         scan,
+        is_first: false,
         previous,
         body: &person.body,
         weights: &person.weights,

@@ -5,6 +5,7 @@
 mod column;
 mod edits;
 mod extraction;
+mod first;
 mod hard_cases;
 mod seed;
 mod stacking;

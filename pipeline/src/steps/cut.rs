@@ -1,6 +1,6 @@
 //! Step `cut`: the new garment out of a dressed take's scan.
 //!
-//! Reads the scan, the scan of the take that it is compared with, both poses, the body, and the layer's edits where there
+//! Reads the scan, the scan of the take that it is compared with (a first take that is dressed is compared with the body alone), both poses, the body, and the layer's edits where there
 //! are any. Writes `cut.ply`, the garment in the take's own pose and frame, and `unstacked.ply`, the same in the common
 //! frame with its skin weights as vertex attributes. Both are empty where nothing new is worn: the record then has a
 //! failure, and the layer is left out.
@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use toile_capture::files::{is_there, read_limited};
+use toile_character::Pose;
 use toile_fitting::rigged_scan;
-use toile_garments::{DressedTake, Edits, Extraction, ExtractionReport, Warning, extract};
-use toile_geometry::ply;
+use toile_garments::{DressedTake, Edits, Extraction, ExtractionReport, extract};
+use toile_geometry::{Mesh, ply};
 
 use crate::{
     PipelineError, Run,
@@ -28,9 +29,9 @@ const UNSURE_SHARE: f32 = 0.15;
 pub struct Cut<'a> {
     /// The run.
     pub run: &'a Run<'a>,
-    /// Number of the take, 1 or more.
+    /// Number of the take; 0 where the first one is dressed.
     pub number: usize,
-    /// Folder name of the take that it is worn as, with one layer more.
+    /// Folder name of the take that it is worn as, with one layer more; take 0 is worn as itself.
     pub worn_as: &'a str,
     /// The body.
     pub body: &'a Body,
@@ -46,10 +47,20 @@ impl Cut<'_> {
         Some(self.run.folders.edits(self.layer())).filter(|path| is_there(path))
     }
 
+    /// The surface worn before in this take's `pose`: the take's that it is compared with, or for take 0 the body.
+    fn worn_before(&self, pose: &Pose, posed_body: &Mesh) -> Result<Mesh, PipelineError> {
+        if self.number == 0 {
+            return Ok(posed_body.clone());
+        }
+        let (folders, before) = (&self.run.folders, self.worn_as);
+        let (scan, pose_before) = (read_mesh(&folders.scan(before))?, read_pose(&folders.pose(before))?);
+        Ok(rigged_scan(&scan, &self.body.skinned, &pose_before).posed_mesh(pose))
+    }
+
     /// Remarks about the findings.
     fn remarks(&self, found: &Extraction) -> Remarks {
         let layer = self.layer();
-        let (nothing, other): (Vec<_>, Vec<_>) = found.warnings.iter().partition(|w| **w == Warning::NothingNew);
+        let (nothing, other): (Vec<_>, Vec<_>) = found.warnings.iter().partition(|w| w.is_empty());
         let mut warnings: Vec<String> = other.into_iter().map(|w| format!("{layer}: {w}")).collect();
         if found.report.unsure_share > UNSURE_SHARE {
             let percent = 100.0 * found.report.unsure_share;
@@ -99,13 +110,15 @@ impl Step for Cut<'_> {
     fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<ExtractionReport>, PipelineError> {
         let (folders, body) = (&self.run.folders, self.body);
         let path = folders.scan(self.layer());
-        let (scan, scan_before) = (read_mesh(&path)?, read_mesh(&folders.scan(self.worn_as))?);
-        let (pose, pose_before) = (read_pose(&folders.pose(self.layer()))?, read_pose(&folders.pose(self.worn_as))?);
+        let (scan, pose) = (read_mesh(&path)?, read_pose(&folders.pose(self.layer()))?);
+        let posed_body = body.skinned.posed_mesh(&pose);
+        let previous = self.worn_before(&pose, &posed_body)?;
         let edits = self.edits().as_deref().map(read_edits).transpose()?;
         let take = DressedTake {
             scan: &scan,
-            previous: &rigged_scan(&scan_before, &body.skinned, &pose_before).posed_mesh(&pose),
-            body: &body.skinned.posed_mesh(&pose),
+            previous: &previous,
+            is_first: self.number == 0,
+            body: &posed_body,
             weights: &body.skinned.weights,
             skeleton: &body.skinned.skeleton,
             pose: &pose,

@@ -82,10 +82,10 @@ impl Export<'_> {
         for garment in self.garments {
             let (mesh, weights) = read_skinned(&folders.garment(&garment.layer))?;
             layers.push(AvatarLayer {
-                name: garment.layer.clone(),
+                name: garment.name.clone(),
                 mesh,
                 weights,
-                order: garment.number as u32,
+                order: (garment.number + 1 - self.run.first_garment()) as u32,
                 garment: Some(garment.garment_type.to_string()),
                 thickness: Some(garment.thickness),
             });

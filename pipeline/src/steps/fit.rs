@@ -1,4 +1,5 @@
-//! Step `fit`: the undressed scan → the body: shape, pose, own surface, weights, measures.
+//! Step `fit`: the undressed scan → the body: shape, pose, own surface, weights, measures. Where the first take is dressed, the
+//! body is estimated, and takes on what the clothes leave bare.
 //!
 //! Reads `00-body/scan.ply` and, where there is one, `SUBJECT/edits/body.json`. Writes `00-body/pose.json` and in `body/`:
 //! `body.ply`, `model.ply`, `rest.ply`, `rigged_scan.glb`, `body.json`, `measurements.json`, `measurements.csv`,
@@ -7,10 +8,12 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Translation3};
-use serde_json::Value;
-use toile_capture::files::is_there;
+use serde_json::{Value, json};
 use toile_character::BodyModel;
-use toile_fitting::{BodyFit, FitReport, FitSettings, MeasureTable, Mend, Verdict, fit_body, measure_table, rig_scan};
+use toile_fitting::{
+    BodyFit, FitReport, FitSettings, MeasureTable, Mend, Verdict, fit_body, measure_table, rig_scan, take_on_bare_skin,
+};
+use toile_garments::{DressedTake, find_cloth};
 use toile_geometry::{Mesh, Rigid, color_transfer::closest_colors, ply};
 
 use crate::{
@@ -19,6 +22,7 @@ use crate::{
     json,
     meshes::{check_kind, read_mesh},
     rigged_scan::rigged_scan,
+    skin_colors::body_colors,
     step::{Product, Step},
 };
 
@@ -54,8 +58,8 @@ impl<'a> Fit<'a> {
     /// [`PipelineError`] where the edits of the body cannot be used.
     pub fn of_subject(run: &'a Run<'a>, model: &'a BodyModel) -> Result<Self, PipelineError> {
         let (layer, folders) = (run.first_layer(), &run.folders);
-        let edits = Some(folders.edits("body")).filter(|path| is_there(path));
-        let edits = edits.as_deref().map(BodyEdits::read).transpose()?.unwrap_or_default();
+        let mut edits = BodyEdits::of_subject(folders)?;
+        edits.dressed |= run.is_first_dressed();
         let (scan, folder, pose) = (folders.scan(layer), folders.body(), folders.pose(layer));
         Ok(Self { run, model, scan, folder, pose, keep_frame: true, settings: edits.over(&run.settings.fit) })
     }
@@ -82,9 +86,32 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
+    /// The body of `fit` on the bare skin of the dressed `scan`, and of each vertex of that whether it is cloth.
+    fn undressed(&self, scan: &Mesh, fit: BodyFit) -> Result<(BodyFit, Vec<bool>), PipelineError> {
+        let upright = fit.mend.apply(scan);
+        let body = fit.posed_body();
+        let take = DressedTake {
+            scan: &upright,
+            previous: &body,
+            is_first: true,
+            body: &body,
+            weights: &fit.body.weights,
+            skeleton: &fit.skeleton,
+            pose: &fit.pose,
+            pose0: &fit.pose,
+            garment_type: None,
+            edits: None,
+        };
+        let is_cloth =
+            find_cloth(&take, &self.run.settings.extract).map_err(|e| PipelineError::stage(&self.scan, e))?;
+        let fit = take_on_bare_skin(self.model, fit, scan, &is_cloth, &self.settings);
+        Ok((fit.map_err(|e| PipelineError::stage(&self.scan, e))?, is_cloth))
+    }
+
     fn files(
         &self,
         scan: &Mesh,
+        is_cloth: &[bool],
         fit: &BodyFit,
         table: &MeasureTable,
     ) -> Result<Vec<(PathBuf, Vec<u8>)>, PipelineError> {
@@ -92,7 +119,11 @@ impl<'a> Fit<'a> {
         let scan = fit.mend.apply(scan);
         let weights = rig_scan(&scan, &fit.body, &fit.pose);
         let mut body = fit.posed_body();
-        body.colors = closest_colors(&scan, &body.positions, &body.normals);
+        body.colors = if fit.report.estimated || fit.report.part.is_some() {
+            body_colors(&scan, is_cloth, &body, fit)
+        } else {
+            closest_colors(&scan, &body.positions, &body.normals)
+        };
         Ok(vec![
             (at("measurements.json"), json::pretty(table)?),
             (at("measurements.csv"), table.csv().into_bytes()),
@@ -110,7 +141,7 @@ impl<'a> Fit<'a> {
 impl Step for Fit<'_> {
     type Report = FitReport;
     const NAME: &'static str = "fit";
-    const VERSION: u32 = 9;
+    const VERSION: u32 = 10;
     const SECONDS: f64 = 4.0;
 
     fn label(&self) -> String {
@@ -127,7 +158,11 @@ impl Step for Fit<'_> {
     }
 
     fn settings(&self) -> Result<Value, PipelineError> {
-        json::plain(&self.settings)
+        let fit = json::plain(&self.settings)?;
+        if !self.settings.dressed {
+            return Ok(fit);
+        }
+        Ok(json!({ "fit": fit, "extract": json::plain(&self.run.settings.extract)? }))
     }
 
     fn outputs(&self) -> Vec<PathBuf> {
@@ -138,18 +173,22 @@ impl Step for Fit<'_> {
         let scan = read_mesh(&self.scan)?;
         let wrong = |e| PipelineError::stage(&self.scan, e);
         let mut fit = fit_body(self.model, &scan, &self.settings, progress).map_err(wrong)?;
-        if self.keep_frame {
-            self.back_to_the_scan(&mut fit)?;
-        }
         if fit.verdict() == Verdict::Failed {
             let reason = format!("no person could be fitted: {}", fit.report.reasons.join("; "));
             return Err(PipelineError::refused(&self.scan, reason));
+        }
+        let mut is_cloth = Vec::new();
+        if self.settings.dressed {
+            (fit, is_cloth) = self.undressed(&scan, fit)?;
+        }
+        if self.keep_frame {
+            self.back_to_the_scan(&mut fit)?;
         }
         let table = measure_table(self.model, &fit.body).map_err(wrong)?.of_fit(&fit);
         // What was not seen is marked in the table; what does not go together wants a look.
         let doubts = table.measures.iter().filter(|m| m.is_measured()).filter_map(|m| m.doubt.as_ref());
         let said = fit.report.reasons.iter().chain(&fit.report.notices).chain(doubts);
         let warnings = said.map(|sentence| format!("body: {sentence}")).collect();
-        Ok(Product::new(self.files(&scan, &fit, &table)?, fit.report, warnings))
+        Ok(Product::new(self.files(&scan, &is_cloth, &fit, &table)?, fit.report, warnings))
     }
 }

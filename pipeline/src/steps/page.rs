@@ -99,7 +99,7 @@ impl Page<'_> {
         let table: MeasureTable = json::read(&folders.measurements())?;
         let found: BodyFile = json::read(&folders.body_json())?;
         let floor = body.bounds().map_or(0.0, |(low, _)| f64::from(low.y));
-        let layers: Vec<String> = self.garments.iter().map(|g| g.layer.clone()).collect();
+        let layers: Vec<String> = self.garments.iter().map(|g| g.name.clone()).collect();
         let stacked = decided.stack.as_ref().map_or(&[][..], |s| &s.layers);
         Ok(Contents {
             name: run.title().to_string(),
@@ -123,7 +123,7 @@ impl Page<'_> {
 
     /// The moves of stacking, and the layers in the motion and in the T-pose.
     fn of_garments(&self) -> Figures {
-        let mut figures = Figures { layers: self.garments.iter().map(|g| g.layer.clone()).collect(), rows: Vec::new() };
+        let mut figures = Figures { layers: self.garments.iter().map(|g| g.name.clone()).collect(), rows: Vec::new() };
         let decided = &self.summary.decided;
         if let Some(stack) = &decided.stack {
             for (what, of) in REST {

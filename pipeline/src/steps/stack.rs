@@ -84,8 +84,7 @@ impl Step for Stack<'_> {
         carry_weights(&layers, &mut weights, &self.body.skinned.skeleton, &self.body.pose0).map_err(wrong)?;
         let encoded = layers.iter().zip(&weights).map(|(mesh, weights)| encode_skinned(mesh, weights));
         let files = self.outputs().into_iter().zip(encoded).collect();
-        let said =
-            self.garments.iter().zip(&report.layers).flat_map(|(g, report)| warnings(&g.layer, report)).collect();
+        let said = self.garments.iter().zip(&report.layers).flat_map(|(g, report)| warnings(&g.name, report)).collect();
         let free_share = layers.iter().map(free_share).collect();
         Ok(Product::new(files, Stacked { layers: report.layers, free_share }, said))
     }

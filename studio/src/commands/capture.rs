@@ -56,6 +56,9 @@ pub struct Capture {
     /// Stop after one full turn of the subject (what happens when nothing else is said)
     #[arg(long)]
     one_turn: bool,
+    /// The first take shows the person dressed, and there is none in underwear: the body is estimated under the clothes
+    #[arg(long, conflicts_with = "retake")]
+    dressed: bool,
     /// Replace the layer's take; the old one is kept under takes/rejected/
     #[arg(long)]
     retake: bool,
@@ -95,7 +98,12 @@ impl Capture {
             subject.retake(&self.layer, self.garment.map(GarmentType::name))?
         } else {
             let garment = self.garment.or_else(|| GarmentType::from_layer_name(&self.layer));
-            subject.next_take(&self.layer, garment.map(GarmentType::name))?
+            let garment = garment.map(GarmentType::name);
+            if self.dressed {
+                subject.dressed_take(&self.layer, garment)?
+            } else {
+                subject.next_take(&self.layer, garment)?
+            }
         };
         let (source, pace) = self.open(subject, &pending)?;
         let mut models: Vec<String> = source.rig().sensors.iter().map(|s| s.identity.model.clone()).collect();

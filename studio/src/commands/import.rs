@@ -19,6 +19,7 @@ const AFTER: &str = "\
 The subject is created where it is missing; the first take is the body (underwear), each further one adds a garment.
 Where garments were taken off one by one, bring the takes in as they were recorded, each called by the outermost garment
 that is worn in it and the last one `body`; `toile reorder SUBJECT --reverse` then puts them in order.
+Where nobody was recorded in underwear, --dressed says so: the body is then estimated under the clothes of the first take.
 Formats, guessed when not said: toile-folder (depth/, color/, camera.json, timestamps.txt; also Open3D's), tum, uva,
 seven-scenes (also 3DMatch), redwood, associated (ICL-NUIM), stray-scanner, freenect (fakenect dumps), record3d (.r3d),
 sens (BundleFusion, ScanNet), bag (ROS 1, librealsense), ros-mcap (ROS 1 and 2), mcap.
@@ -29,7 +30,8 @@ Examples:
   toile import scans/body.obj --subject anna --layer body
   toile import takes/body     --subject anna --layer body
   toile import takes/trousers --subject anna --layer trousers --type trousers
-  toile import takes/again    --subject anna --layer trousers --retake";
+  toile import takes/again    --subject anna --layer trousers --retake
+  toile import takes/only     --subject ben  --layer clothes --dressed";
 
 /// Import a recorded folder into a subject as its next take
 #[derive(Debug, clap::Args)]
@@ -49,6 +51,9 @@ pub struct Import {
     /// The type of the garment: top, trousers, skirt, dress, jacket, hat, shoes, other
     #[arg(long = "type", value_name = "TYPE")]
     garment: Option<GarmentType>,
+    /// The first take shows the person dressed, and there is none in underwear: the body is estimated under the clothes
+    #[arg(long, conflicts_with = "retake")]
+    dressed: bool,
     /// Replace the layer's take; the old one is kept under takes/rejected/
     #[arg(long)]
     retake: bool,
@@ -128,7 +133,12 @@ impl Import {
             return Ok(subject.retake(&self.layer, self.garment.map(GarmentType::name))?);
         }
         let garment = self.garment.or_else(|| GarmentType::from_layer_name(&self.layer));
-        Ok(subject.next_take(&self.layer, garment.map(GarmentType::name))?)
+        let garment = garment.map(GarmentType::name);
+        Ok(if self.dressed {
+            subject.dressed_take(&self.layer, garment)?
+        } else {
+            subject.next_take(&self.layer, garment)?
+        })
     }
 
     /// Imports a finished scan: its files are copied as they are, after one look at what they hold.

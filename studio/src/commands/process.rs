@@ -25,6 +25,7 @@ A subject that fails does not stop the others.
 Examples:
   toile process anna
   toile process archive/* --motion dance.bvh
+  toile process ben --dressed
   toile process anna --json | jq .results";
 
 /// Everything from recorded takes to avatar and report: runs whatever is missing
@@ -40,6 +41,9 @@ pub struct Process {
     /// turntable (usual): the person turns evenly before a resting camera; none: a camera held by hand
     #[arg(long, value_enum)]
     prior: Option<PriorChoice>,
+    /// The first take shows the person dressed: the body is estimated under the clothes, which become a layer (kept in edits/body.json)
+    #[arg(long)]
+    dressed: bool,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
@@ -55,6 +59,7 @@ impl Process {
             motion: motion_choice(self.motion.as_deref()),
             fusion: FusionChoice { prior: self.prior.map(Into::into), ..FusionChoice::default() },
             settings: self.settings.clone(),
+            dressed: self.dressed,
             ..Options::default()
         };
         process(&self.subjects, &options, session)
