@@ -9,7 +9,7 @@ use super::{
     choose::best_start,
     fingers::fit_fingers,
     guides::Guides,
-    part::{believed, is_suspected},
+    part::{is_believed, is_suspected},
     placement::Extent,
     prepare::{Mend, Prepared, prepare},
     report::{FitReport, Verdict},
@@ -100,10 +100,11 @@ pub fn fit_body(
     let lying = Bvh::new(&prepared.mesh.positions, &prepared.mesh.triangles);
     let fitter = Fitter { model, prepared: &prepared, trust: &trust, lying: &lying, by_hand: &by_hand, settings };
     let whole = fitter.fit(Extent::Whole, progress)?;
-    if settings.method == Method::Seed || !is_suspected(&whole, &prepared.mesh) {
+    if settings.method == Method::Seed || !is_suspected(&whole.report, &prepared.mesh) {
         return Ok(whole);
     }
-    Ok(believed(whole, fitter.fit(Extent::FromCrown, &|_| {})?))
+    let part = fitter.fit(Extent::FromCrown, &|_| {})?;
+    Ok(if is_believed(&part.report) { part } else { whole })
 }
 
 /// What a fit starts from.

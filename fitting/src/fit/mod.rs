@@ -28,8 +28,7 @@ pub(crate) use search::{Depths, Search};
 pub use {
     bare::take_on_bare_skin,
     body::{BodyFit, fit_body},
-    part::PartShown,
     prepare::Mend,
-    report::{DistanceStats, FitReport, Verdict},
+    report::{DistanceStats, FitReport, PartShown, Verdict},
     upright::find_upright,
 };

@@ -5,7 +5,6 @@
 //! seen. Only parts with a head are looked for: without one, neither heading nor size is known.
 
 use nalgebra::Point3;
-use serde::{Deserialize, Serialize};
 use toile_character::{BodyModel, Joint, Region};
 use toile_geometry::{
     Mesh,
@@ -13,10 +12,7 @@ use toile_geometry::{
     statistics::{Rank, quantile_by},
 };
 
-use super::{
-    body::BodyFit,
-    report::{FitReport, Verdict},
-};
+use super::report::{FitReport, PartShown, Verdict};
 use crate::solve::State;
 
 /// The tallest scan of a part, metres: a short person (1.5 m) without feet and shins.
@@ -28,31 +24,15 @@ const SEEN: f32 = 0.5;
 /// The body starts to be expected this far over the scan's lower end, metres: a rim is ragged by some pixels.
 const RIM: f32 = 0.03;
 
-/// The upper part of a person that a scan shows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PartShown {
-    /// Where it begins, in words: `hips`.
-    pub from: String,
-    /// Height of the scan's lower end, metres, in the fit's frame.
-    pub cut_m: f64,
-    /// How far the body goes on below it, metres.
-    pub below_m: f64,
-    /// Share of the body's skin above the lower end that the scan covers, 0–1.
-    pub covered: f64,
-    /// Share of the trunk's skin that the scan covers, 0–1.
-    pub trunk_covered: f64,
-}
-
 /// Whether a fit to the whole scan may have been one to a part of a person.
-pub(super) fn is_suspected(whole: &BodyFit, scan: &Mesh) -> bool {
+pub(super) fn is_suspected(whole: &FitReport, scan: &Mesh) -> bool {
     let height = scan.bounds().map_or(0.0, |(low, high)| high.y - low.y);
-    whole.verdict() != Verdict::Trusted && height < TALLEST
+    whole.verdict != Verdict::Trusted && height < TALLEST
 }
 
-/// The fit that is believed: that to a part where it finds nothing wrong but that it is one, or that too little is shown.
-pub(super) fn believed(whole: BodyFit, part: BodyFit) -> BodyFit {
-    let is_person = part.verdict() != Verdict::Failed || part.report.is_too_little;
-    if is_person { part } else { whole }
+/// Whether a fit to a part is believed: nothing is wrong with it but that it is one, or that too little is shown.
+pub(super) fn is_believed(part: &FitReport) -> bool {
+    part.verdict != Verdict::Failed || part.is_too_little
 }
 
 impl PartShown {
@@ -84,15 +64,6 @@ impl PartShown {
             trunk_covered: share(&|v| model.regions[v] == Region::Torso),
         }
     }
-
-    /// The sentence that says what is shown.
-    pub fn sentence(&self) -> String {
-        format!(
-            "the scan shows a person from the {} up: what lies below, the stature and their measures were not seen; they are those \
-             of an ordinary body that goes with the rest; scan the whole person to have them",
-            self.from
-        )
-    }
 }
 
 /// The level of the body that lies nearest to `height`, in words.
@@ -113,11 +84,4 @@ fn level(model: &BodyModel, state: &State, height: f64) -> &'static str {
     ];
     let nearest = levels.into_iter().min_by(|a, b| (a.1 - height).abs().total_cmp(&(b.1 - height).abs()));
     nearest.map_or("neck", |l| l.0)
-}
-
-impl FitReport {
-    /// Whether the scan shows the skin of legs and feet, so that heights over the floor are known.
-    pub fn shows_floor(&self) -> bool {
-        self.part.is_none()
-    }
 }

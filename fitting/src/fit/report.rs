@@ -4,8 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::part::PartShown;
-
 /// Whether a fit is to be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -27,6 +25,32 @@ pub struct DistanceStats {
     pub median_mm: f64,
     /// 95th percentile.
     pub p95_mm: f64,
+}
+
+/// The upper part of a person that a scan shows.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PartShown {
+    /// Where it begins, in words: `hips`.
+    pub from: String,
+    /// Height of the scan's lower end, metres, in the fit's frame.
+    pub cut_m: f64,
+    /// How far the body goes on below it, metres.
+    pub below_m: f64,
+    /// Share of the body's skin above the lower end that the scan covers, 0–1.
+    pub covered: f64,
+    /// Share of the trunk's skin that the scan covers, 0–1.
+    pub trunk_covered: f64,
+}
+
+impl PartShown {
+    /// The sentence that says what is shown.
+    pub fn sentence(&self) -> String {
+        format!(
+            "the scan shows a person from the {} up: what lies below, the stature and their measures were not seen; they are those \
+             of an ordinary body that goes with the rest; scan the whole person to have them",
+            self.from
+        )
+    }
 }
 
 /// The decisions of a body fit, and how good it is.

@@ -7,9 +7,8 @@ use toile_geometry::Mesh;
 use super::{
     astray::Astray,
     evidence::{Coverage, Distances, samples},
-    part::PartShown,
     placement::Extent,
-    report::{FitReport, Verdict},
+    report::{FitReport, PartShown, Verdict},
 };
 use crate::{
     Measurements,
