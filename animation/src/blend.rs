@@ -12,13 +12,15 @@
 //! where they came to lie ([`Wearer::correct`]): the next frame starts from there.
 
 mod anchors;
+mod layer;
 mod outfit;
 mod proxy;
 mod ride;
 mod squeeze;
 mod wearer;
 
-pub use outfit::{Outfit, OutfitLayer};
+pub use layer::OutfitLayer;
+pub use outfit::Outfit;
 pub use wearer::Wearer;
 
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,9 @@
 //! One step of a hanging sheet.
+#![allow(missing_docs)]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, Vector3};
-use toile_cloth::{Anchors, Effort, Fabric, Sheet, Surroundings};
+use toile_cloth::{Anchors, Effort, Fabric, RestShape, Sheet, Surroundings};
 
 fn step(c: &mut Criterion) {
     let n = 70u32;

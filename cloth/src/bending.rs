@@ -140,6 +140,7 @@ mod tests {
     use super::*;
 
     /// A strip bent around a cylinder, and flat.
+    #[allow(clippy::type_complexity)]
     fn strip(n: u32, radius: f64, width: f64) -> (Vec<Point3<f64>>, Vec<Point3<f64>>, Vec<[u32; 3]>) {
         let bent = |i: u32, row: u32| {
             let angle = f64::from(i) * 0.02;

@@ -30,7 +30,7 @@ pub(crate) fn minimise(objective: &Objective, x: &mut Vec<Vector3<f64>>, iterati
     for _ in 0..iterations {
         let direction = direction(objective, &gradient, &learnt);
         let slope = dot(&direction, &gradient);
-        if !(slope < 0.0) || dot(&direction, &direction) < tolerance * tolerance * n as f64 {
+        if slope.is_nan() || slope >= 0.0 || dot(&direction, &direction) < tolerance * tolerance * n as f64 {
             break;
         }
         let mut length = 1.0;

@@ -34,7 +34,7 @@ impl Objective<'_> {
         let per_square = 1.0 / (self.system.step * self.system.step);
         let mut energy = 0.0;
         for v in 0..x.len() {
-            let (mass, anchor) = (self.sheet.masses[v] * per_square, self.sheet.anchors[v]);
+            let (mass, anchor) = (self.sheet.rest.masses[v] * per_square, self.sheet.rest.anchors[v]);
             let (off, from_anchor) = (x[v] - self.inertial[v], x[v] - self.anchors[v]);
             energy += 0.5 * (mass * off.norm_squared() + anchor * from_anchor.norm_squared());
             gradient[v] = off * mass + from_anchor * anchor;
@@ -43,9 +43,9 @@ impl Objective<'_> {
     }
 
     fn elastic(&self, x: &[Vector3<f64>], gradient: &mut [Vector3<f64>]) -> f64 {
-        let fabric = &self.sheet.fabric;
+        let fabric = &self.sheet.rest.fabric;
         let mut energy = 0.0;
-        for element in &self.sheet.elements {
+        for element in &self.sheet.rest.elements {
             let (density, derivative) = membrane::energy(&element.deformation(x), fabric.stretch, fabric.shear);
             energy += element.area * density;
             for (v, g) in element.vertices.iter().zip(&element.gradients) {
@@ -53,7 +53,7 @@ impl Objective<'_> {
             }
         }
         let mut bent = 0.0;
-        for bend in &self.sheet.bends {
+        for bend in &self.sheet.rest.bends {
             bent += bend.energy(x, |v, d| gradient[v as usize] += d * fabric.bending);
         }
         energy + fabric.bending * bent

@@ -31,6 +31,8 @@ pub struct Surroundings<'a> {
     pub gaps: &'a [f64],
     /// Rate at which motion against the anchors dies down, 1/s.
     pub drag: f64,
+    /// Deceleration of that motion by the cloth's own dry friction (bending hysteresis), m/s²: what brings it to rest.
+    pub dry: f64,
 }
 
 impl Default for Surroundings<'_> {
@@ -52,6 +54,7 @@ impl Surroundings<'_> {
             obstacles: &[],
             gaps: &[],
             drag: 0.0,
+            dry: 0.0,
         }
     }
 }
@@ -97,14 +100,11 @@ impl Sheet {
         let inertial = self.inertial(h, around);
         let anchors = if around.anchors.is_empty() { &self.positions } else { around.anchors };
         let mut x = if around.guess.is_empty() { inertial.clone() } else { around.guess.to_vec() };
-        let friction = Friction { coefficient: self.fabric.friction, step: h };
+        let friction = Friction { coefficient: self.rest.fabric.friction, step: h };
         let mut pressed = self.pressed.clone();
         for _ in 0..effort.rounds {
             let contacts = contact::find(&x, around.obstacles, around.gaps, REACH, &system.diagonal, &pressed);
-            let pairs = match effort.self_contact {
-                true => self.neighbourhood.pairs(&x, &system.diagonal),
-                false => Vec::new(),
-            };
+            let pairs = if effort.self_contact { self.neighbourhood.pairs(&x, &system.diagonal) } else { Vec::new() };
             system.hold(&x, &contacts, &pairs)?;
             let (inertial, contacts, pairs) = (&inertial, &contacts, &pairs);
             let objective = Objective { sheet: self, system: &system, inertial, anchors, contacts, pairs, friction };
@@ -127,10 +127,12 @@ impl Sheet {
             let share = 1.0 - (-around.drag * h).exp();
             for (v, velocity) in velocities.iter_mut().enumerate() {
                 let carried = (around.anchors[v] - self.carried.get(v).unwrap_or(&around.anchors[v])) / h;
-                *velocity += (carried - *velocity) * share;
+                let relative = (*velocity - carried) * (1.0 - share);
+                let speed = relative.norm();
+                *velocity = carried + relative * ((speed - around.dry * h).max(0.0) / speed.max(1e-12));
             }
         }
-        self.neighbourhood.damp(&mut velocities, self.fabric.damping, h);
+        self.neighbourhood.damp(&mut velocities, self.rest.fabric.damping, h);
         air::slow_down(self, &mut velocities, &around.wind, h);
         self.positions.iter().zip(&velocities).map(|(p, v)| p + v * h).collect()
     }

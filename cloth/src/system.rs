@@ -14,7 +14,7 @@ use faer::{
 };
 use nalgebra::Vector3;
 
-use crate::{ClothError, Sheet, contact::Contact, self_contact::Pair};
+use crate::{ClothError, contact::Contact, rest::Rest, self_contact::Pair};
 
 /// A over one length of time step.
 #[derive(Debug, Clone)]
@@ -32,13 +32,13 @@ pub(crate) struct System {
 }
 
 impl System {
-    pub fn new(sheet: &Sheet, h: f64) -> Result<Self, ClothError> {
+    pub fn new(rest: &Rest, h: f64) -> Result<Self, ClothError> {
         if !(h.is_finite() && h > 0.0) {
             return Err(ClothError::TimeStep(h));
         }
-        let n = sheet.len();
-        let mut entries = elastic(sheet);
-        entries.extend((0..n).map(|v| Triplet::new(v, v, sheet.masses[v] / (h * h) + sheet.anchors[v])));
+        let n = rest.len();
+        let mut entries = elastic(rest);
+        entries.extend((0..n).map(|v| Triplet::new(v, v, rest.masses[v] / (h * h) + rest.anchors[v])));
         let matrix = SparseColMat::try_new_from_triplets(n, n, &entries)
             .map_err(|_| ClothError::Sheet("its stiffness cannot be assembled".into()))?;
         let symbolic = SymbolicLlt::try_new(matrix.symbolic(), Side::Upper)
@@ -81,27 +81,26 @@ fn factorise(symbolic: &SymbolicLlt<usize>, matrix: &SparseColMat<usize, f64>) -
 }
 
 /// Upper triangle of the elastic part.
-fn elastic(sheet: &Sheet) -> Vec<Triplet<usize, usize, f64>> {
-    let mut entries = Vec::with_capacity(sheet.elements.len() * 6 + sheet.bends.len() * 21 + sheet.len());
+fn elastic(rest: &Rest) -> Vec<Triplet<usize, usize, f64>> {
+    let mut entries = Vec::with_capacity(rest.elements.len() * 6 + rest.bends.len() * 21 + rest.len());
     let mut put = |a: u32, b: u32, value: f64| {
         entries.push(Triplet::new(a.min(b) as usize, a.max(b) as usize, value));
     };
-    let membrane = sheet.fabric.stretch + 2.0 * sheet.fabric.shear;
-    for e in &sheet.elements {
+    let membrane = rest.fabric.stretch + 2.0 * rest.fabric.shear;
+    for e in &rest.elements {
         for i in 0..3 {
             for j in i..3 {
                 put(e.vertices[i], e.vertices[j], membrane * e.area * e.gradients[i].dot(&e.gradients[j]));
             }
         }
     }
-    for bend in &sheet.bends {
+    for bend in &rest.bends {
         let second = bend.second_derivative();
-        for i in 0..6 {
-            for j in 0..6 {
+        for (a, row) in bend.vertices.into_iter().zip(second) {
+            for (b, value) in bend.vertices.into_iter().zip(row) {
                 // Entries of a pair stand twice; a border's corner that stands for nothing has a weight of zero.
-                let (a, b) = (bend.vertices[i], bend.vertices[j]);
-                if a < b || (a == b) {
-                    put(a, b, sheet.fabric.bending * second[i][j]);
+                if a <= b {
+                    put(a, b, rest.fabric.bending * value);
                 }
             }
         }

@@ -109,7 +109,8 @@ fn calibrated(samples: &[Sample]) -> ErrorModel {
         }
     }
     let [base, unseen, distance] = best.1.map(f64::sqrt);
-    let model = ErrorModel { base_mm: base, unseen_mm: unseen, per_distance: distance, dressed_mm: 0.0, population_mm: 0.0 };
+    let model =
+        ErrorModel { base_mm: base, unseen_mm: unseen, per_distance: distance, dressed_mm: 0.0, population_mm: 0.0 };
     let mut shares: Vec<f64> = samples
         .iter()
         .map(|s| s.error_mm.abs() / (1e3 * model.half_interval_m(1.0 - s.unseen, s.distance_mm)).max(1e-6))

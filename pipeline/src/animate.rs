@@ -1,6 +1,8 @@
 //! Moving layers as files: `SUBJECT/motion/NAME/`, a point cache a layer.
 
 mod caches;
+mod options;
+mod playable;
 mod report;
 
 use std::{
@@ -13,12 +15,12 @@ use toile_animation::{
     resample,
 };
 use toile_avatar::Avatar;
-use toile_character::{BodyModel, Motion, Skinning};
+use toile_character::{BodyModel, Motion};
 use toile_cloth::Fabric;
 use toile_garments::{Apart, ExtractionReport, GarmentType};
 
-pub use self::report::AnimationReport;
 use self::{caches::Caches, report::FrameReport};
+pub use self::{options::AnimateOptions, report::AnimationReport};
 use crate::{
     Goal, Observer, Options, PipelineError, Record, Run,
     avatar_choice::AvatarChoice,
@@ -36,21 +38,6 @@ use crate::{
 const SECONDS: f64 = 0.15;
 /// Seconds over which the layers come from the pose of the scan into the motion's first, and settle there.
 const WARM_UP: (f64, f64) = (1.0, 0.5);
-
-/// How layers are to move.
-#[derive(Debug, Clone)]
-pub struct AnimateOptions {
-    /// The motion.
-    pub motion: MotionChoice,
-    /// Frames a second.
-    pub fps: f64,
-    /// How the layers follow the skeleton.
-    pub blend: Blend,
-    /// How skin weights are blended.
-    pub skinning: Skinning,
-    /// Settings of the stages.
-    pub settings: Option<PathBuf>,
-}
 
 /// What was written.
 #[derive(Debug)]
@@ -169,6 +156,9 @@ fn bake(
         observer.at((k + 1) as f32 / motion.poses.len() as f32);
     }
     report.sum_up();
-    caches.finish(&report)?;
+    let written = caches.written()?;
+    let points: Vec<usize> = names.iter().map(|n| n.1).collect();
+    let glb = playable::glb(avatar, motion, &mut written.open(&points)?, folder)?;
+    written.finish(&glb, &report)?;
     Ok(report)
 }

@@ -34,7 +34,7 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
     }
     // What would fail only after a long time.
     (run.first_garment()..run.layers.len()).try_for_each(|n| garment::given_thickness(&run, n).map(drop))?;
-    if goal > Goal::Scans && !run.is_first_dressed() {
+    if goal > Goal::Scans {
         take_order::check_first(&run)?;
     }
     observer.plan(seconds(&run, goal));

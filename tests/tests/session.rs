@@ -310,3 +310,55 @@ fn a_record_changed_by_hand_is_noticed_and_built_again() {
     assert!(reported["warnings"].as_array().unwrap().iter().any(is_said), "{reported}");
     assert_eq!(fs::read_to_string(&path).unwrap(), whole);
 }
+
+/// Layers in motion: apart in every frame, in caches that fit the avatar, whole or not at all, the same for any number of threads.
+#[test]
+fn layers_move_without_crossing() {
+    let dir = tempfile::tempdir().unwrap();
+    let subject = dir.path().join("rowan");
+    copy(demo(), &subject);
+    let animate = |threads: &str| {
+        let words = ["animate", subject.to_str().unwrap(), "--fps", "8", "--threads", threads, "--json"];
+        let done = toile(&words).output().unwrap();
+        let answer: Value = serde_json::from_slice(&done.stdout).unwrap();
+        assert_eq!(done.status.code(), Some(0), "{answer}");
+        answer
+    };
+    animate("2");
+    let folder = subject.join("motion").join("walk");
+    let report: Value = serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap();
+    let frames = report["frames"].as_array().unwrap();
+    assert!(frames.len() == 35 && report["fps"].as_f64() == Some(8.0), "{report}");
+    assert!(frames.iter().all(|f| f["crossing"] == 0), "{frames:?}");
+    let glb = glb_json(&subject.join("avatar.glb"));
+    let layers: Vec<String> = glb["nodes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|n| !n["mesh"].is_null())
+        .map(|n| {
+            let mesh = &glb["meshes"][n["mesh"].as_u64().unwrap() as usize];
+            let positions = mesh["primitives"][0]["attributes"]["POSITION"].as_u64().unwrap() as usize;
+            let points = glb["accessors"][positions]["count"].as_u64().unwrap();
+            let name = n["name"].as_str().unwrap().to_string();
+            let cache = fs::read(folder.join(format!("{name}.pc2"))).unwrap();
+            assert_eq!(cache.len() as u64, 32 + 35 * points * 12, "{name}");
+            name
+        })
+        .collect();
+    assert!(layers.len() >= 2 && layers[0] == "body", "{layers:?}");
+    let caches =
+        |folder: &Path| files(folder).into_iter().filter(|f| f.0 != Path::new("report.json")).collect::<Vec<_>>();
+    let before = caches(&folder);
+    assert_eq!(before.len(), layers.len() + 1, "a cache a layer, and motion.glb");
+    animate("1");
+    assert!(caches(&folder) == before, "another number of threads gives other bytes");
+}
+
+fn copy(from: &Path, to: &Path) {
+    for (name, bytes) in files(from) {
+        let path = to.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+}

@@ -10,7 +10,7 @@ use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals};
 /// Frequency of cloth on the skin, rad/s: an acceleration of 2 g takes it 0.9 mm from its place.
 const TIGHT: f64 = 150.0;
 /// Frequency of cloth that hangs free, rad/s.
-const LOOSE: f64 = 4.0;
+const LOOSE: f64 = 5.0;
 /// Distance from the skin up to which cloth lies on it, metres: twice the deepest fold of a knitted garment that is worn close.
 const NEAR: f64 = 0.015;
 /// Distance from which cloth hangs free, metres: half the width of a trouser leg over a shin.

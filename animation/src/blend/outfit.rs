@@ -2,25 +2,11 @@
 
 use nalgebra::Point3;
 use rayon::prelude::*;
-use toile_character::{Pose, Skeleton, SkinWeights, Skinner};
-use toile_cloth::Fabric;
+use toile_character::{Pose, Skeleton, Skinner};
 use toile_geometry::Mesh;
 
-use super::{anchors::Closeness, proxy::Proxy, squeeze::Columns};
+use super::{anchors::Closeness, layer::OutfitLayer, proxy::Proxy, squeeze::Columns};
 use crate::AnimationError;
-
-/// A layer of an outfit: the body, or a garment.
-#[derive(Debug, Clone)]
-pub struct OutfitLayer {
-    /// Name of the layer.
-    pub name: String,
-    /// The mesh in the outfit's first pose.
-    pub mesh: Mesh,
-    /// Its skin weights.
-    pub weights: SkinWeights,
-    /// What it is made of; not read for the body.
-    pub fabric: Fabric,
-}
 
 /// A body and its garments, inside to outside, in the pose in which they were scanned.
 pub struct Outfit {

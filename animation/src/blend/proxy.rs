@@ -2,12 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 use toile_character::{FREE_PART, SkinWeights, Skinner};
-use toile_cloth::{Anchors, Sheet};
+use toile_cloth::{Anchors, RestShape, Sheet};
 use toile_geometry::{Mesh, bvh::Bvh, remesh};
 
 use super::{
     anchors::{Closeness, Over, frequency},
-    outfit::OutfitLayer,
+    layer::OutfitLayer,
     ride::Ride,
 };
 use crate::AnimationError;
@@ -43,7 +43,8 @@ impl Proxy {
         let distance = |v: usize| f64::from(over[v].height).max(0.0);
         let frequencies: Vec<f64> = (0..over.len()).map(|v| frequency(distance(v), free[v])).collect();
         let rest: Vec<Point3<f64>> = mesh.positions.iter().map(|p| p.cast()).collect();
-        let new = |anchors| Sheet::new(&rest, &mesh.triangles, layer.fabric, true, &Vector3::y(), anchors);
+        let shape = RestShape { positions: &rest, triangles: &mesh.triangles, curved: true, grain: Vector3::y() };
+        let new = |anchors| Sheet::new(&shape, layer.fabric, anchors);
         let masses = new(Anchors::default()).map_err(|e| wrong(e.to_string()))?.masses().to_vec();
         let stiffness = masses.iter().zip(&frequencies).map(|(m, w)| m * w * w).collect();
         let sheet = new(Anchors { stiffness }).map_err(|e| wrong(e.to_string()))?;

@@ -34,6 +34,8 @@ pub(crate) struct Columns {
     tops: Vec<f32>,
     /// For each garment, which of the layers over each vertex it is, from 1; the last tells how many there are.
     ranks: Vec<Vec<f32>>,
+    /// Excess of each column in the outfit's first pose, metres.
+    scanned: Vec<f32>,
     /// Where the vertices of each garment's mesh stand.
     over: Vec<Vec<Over>>,
 }
@@ -77,15 +79,16 @@ impl Columns {
             tops = widened(&tops, &neighbours);
         }
         let tops = smoothed(&tops, &neighbours, 3);
-        Self { triangles: body.triangles.clone(), neighbours, depths: depths(body), tops, ranks, over }
+        let (triangles, depths) = (body.triangles.clone(), depths(body));
+        let mut columns = Self { triangles, neighbours, depths, tops, ranks, over, scanned: Vec::new() };
+        columns.scanned = columns.excess(&body.positions, &body.vertex_normals());
+        columns
     }
 
-    /// How the columns are pressed where the body stands at `body`.
-    pub fn press(&self, body: &[Point3<f32>]) -> Pressed {
-        let normals = vertex_normals(body, &self.triangles);
+    /// How much taller than the room that it has each column is, metres, at least 0, where the body stands at `body`.
+    fn excess(&self, body: &[Point3<f32>], normals: &[Vector3<f32>]) -> Vec<f32> {
         let bvh = Bvh::new(body, &self.triangles);
         let faces: Vec<Vector3<f32>> = toile_geometry::mesh::triangle_normals(body, &self.triangles);
-        // How much taller each column is than the room that it has.
         let excess = |v: usize| {
             let (n, depth) = (normals[v], self.depths[v]);
             let origin = body[v] - n * depth;
@@ -93,7 +96,15 @@ impl Columns {
             let hit = bvh.ray_where(&origin, &n, depth + 2.0 * self.tops[v] + 2.0 * MARGIN, faces_us);
             hit.map_or(0.0, |h| (self.tops[v] + MARGIN - (h.t - depth) / 2.0).max(0.0))
         };
-        let excess: Vec<f32> = (0..body.len()).into_par_iter().map(excess).collect();
+        (0..body.len()).into_par_iter().map(excess).collect()
+    }
+
+    /// How the columns are pressed where the body stands at `body`.
+    pub fn press(&self, body: &[Point3<f32>]) -> Pressed {
+        let normals = vertex_normals(body, &self.triangles);
+        let excess = self.excess(body, &normals);
+        // What lay so in the outfit's first pose was scanned so.
+        let excess: Vec<f32> = excess.iter().zip(&self.scanned).map(|(now, then)| (now - then).max(0.0)).collect();
         // Wider than the smoothing reaches, so that it takes nothing off where two parts meet.
         let excess = (0..WIDENINGS).fold(excess, |excess, _| widened(&excess, &self.neighbours));
         let excess = smoothed(&excess, &self.neighbours, SMOOTHINGS);

@@ -13,7 +13,9 @@ const LONGEST_WAY: f32 = 0.015;
 /// Steps of the simulation in a frame: at least, at most.
 const STEPS: (usize, usize) = (2, 6);
 /// Rate at which the air and the layers below damp cloth that moves against the body, 1/s.
-const DRAG: f64 = 4.0;
+const DRAG: f64 = 7.0;
+/// Deceleration by the cloth's own friction, m/s²: a twentieth of gravity, as cloth hangs in shapes that differ by so much.
+const DRY: f64 = 0.5;
 /// Time in which corrections fade, seconds: a step and a half of a walk.
 const FORGET: f64 = 1.5;
 
@@ -198,9 +200,10 @@ impl<'a> Wearer<'a> {
                     obstacles: &obstacles,
                     gaps: &outfit.proxies[k].gaps,
                     drag: DRAG,
+                    dry: DRY,
                     ..Surroundings::still()
                 };
-                sheet.advance(h, &around, &Effort { rounds: 1, iterations: 8, tolerance: 2e-5, self_contact: false })
+                sheet.advance(h, &around, &Effort { rounds: 1, iterations: 10, tolerance: 5e-6, self_contact: false })
             })
             .collect();
         results.into_iter().collect::<Result<(), _>>().map_err(|e| wrong(&e))?;

@@ -120,30 +120,41 @@ impl Subject {
                  `toile process {folder}` goes on with it, as does every command that writes here"
             )
         });
-        unknown.chain(left).chain(self.wrong_order()).chain(renamed).collect()
+        unknown.chain(left).chain(self.wrong_order()).chain(self.without_body()).chain(renamed).collect()
     }
 
-    /// A sentence where the first take is not the body, which it has to be before the subject is processed.
+    /// A sentence where the body's take is not the first, which it has to be before the subject is processed.
     pub fn wrong_order(&self) -> Option<String> {
-        let first = self.about.layers.first().filter(|layer| layer.name != BODY)?.label();
-        let folder = printable_path(&self.folder);
-        let count = self.about.layers.len();
-        let last = self.about.layers.iter().position(|layer| layer.name == BODY);
-        Some(match last {
-            Some(body) if body + 1 == count => format!(
+        let (first, folder) = (self.dressed_first()?, printable_path(&self.folder));
+        let body = self.about.layers.iter().position(|layer| layer.name == BODY)?;
+        Some(if body + 1 == self.about.layers.len() {
+            format!(
                 "{folder}: take 0 is {first} and the last take is the body, as where garments were taken off one by one; \
                  `toile reorder {folder} --reverse` puts the takes in the order in which garments are put on"
-            ),
-            Some(_) => format!(
+            )
+        } else {
+            format!(
                 "{folder}: take 0 is {first}, but the body comes first, and then each garment in the order in which it is put \
                  on; `toile reorder {folder} --order body,...` puts the takes in that order"
-            ),
-            None => format!(
-                "{folder}: take 0 is {first} and no take is called `body`: where garments were taken off one by one, bring in \
-                 the other takes, the one of the body (in underwear) last with --layer body, and then run `toile reorder \
-                 {folder} --reverse`; where take 0 shows the body, `toile reorder {folder} --names body,...` calls it so"
-            ),
+            )
         })
+    }
+
+    /// A sentence where no take shows the body: the person counts as dressed in the first.
+    fn without_body(&self) -> Option<String> {
+        let (first, folder) = (self.dressed_first()?, printable_path(&self.folder));
+        self.about.layers.iter().all(|layer| layer.name != BODY).then(|| {
+            format!(
+                "{folder}: no take is called `body`, so the person counts as dressed in {first}; where that take shows the body \
+                 in underwear, `toile reorder {folder} --names body,...` calls it so, and where garments were taken off one \
+                 by one, bring in the others, the body last, and run `toile reorder {folder} --reverse`"
+            )
+        })
+    }
+
+    /// Folder name of the first take where that is not called `body`.
+    fn dressed_first(&self) -> Option<String> {
+        self.about.layers.first().filter(|layer| layer.name != BODY).map(Layer::label)
     }
 
     /// Recordings in `takes/` that were not finished and that no process writes any more, by name.

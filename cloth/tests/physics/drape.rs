@@ -1,7 +1,9 @@
 //! A disc over a stand, as in Cusick's drapemeter (BS 5058): a cloth of 30 cm over a support of 18 cm.
 
+#![allow(clippy::unwrap_used)] // all of it is test code
+
 use nalgebra::{Point3, Vector3};
-use toile_cloth::{Anchors, Effort, Fabric, Sheet, Surroundings};
+use toile_cloth::{Anchors, Effort, Fabric, RestShape, Sheet, Surroundings};
 
 /// A disc of rings; its triangles' diagonals run one way or the other.
 fn disc(rings: u32, radius: f64, forward: bool) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
@@ -34,7 +36,8 @@ fn drape_coefficient(bending_length: f64, rings: u32, forward: bool) -> f64 {
         Fabric { density, stretch: 500.0, shear: 40.0, bending, thickness: 0.0005, friction: 0.4, damping: 4.0 };
     let stiffness = rest.iter().map(|p| if p.coords.norm() < 0.0901 { 1e4 } else { 0.0 }).collect();
     let anchors: Vec<Vector3<f64>> = rest.iter().map(|p| p.coords).collect();
-    let mut sheet = Sheet::new(&rest, &triangles, fabric, false, &Vector3::x(), Anchors { stiffness }).unwrap();
+    let shape = RestShape { positions: &rest, triangles: &triangles, curved: false, grain: Vector3::x() };
+    let mut sheet = Sheet::new(&shape, fabric, Anchors { stiffness }).unwrap();
     // A flat disc cannot choose where to fold: nudge it by a hundredth of a millimetre.
     for (v, p) in sheet.positions.iter_mut().enumerate() {
         p.y += 1e-5 * (v as f64 * 0.731).sin();

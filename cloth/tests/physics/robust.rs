@@ -1,5 +1,7 @@
 //! Nothing explodes.
 
+#![allow(clippy::unwrap_used)] // all of it is test code
+
 use nalgebra::Vector3;
 use toile_cloth::{Effort, Fabric, Surroundings, obstacle::Plane};
 

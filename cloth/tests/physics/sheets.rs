@@ -1,7 +1,7 @@
 //! Rectangular sheets for the trials.
 
 use nalgebra::{Point3, Vector3};
-use toile_cloth::{Anchors, Effort, Fabric, Sheet};
+use toile_cloth::{Anchors, Effort, Fabric, RestShape, Sheet};
 
 /// Direction of the diagonals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +53,9 @@ impl Grid {
     pub fn sheet(&self, fabric: Fabric, held: impl Fn(u32) -> bool) -> Sheet {
         let stiffness = (0..self.rest.len()).map(|v| if held(self.row(v)) { 1e5 } else { 0.0 }).collect();
         let anchors = Anchors { stiffness };
-        Sheet::new(&self.rest, &self.triangles, fabric, false, &Vector3::z(), anchors).expect("a sheet")
+        let (positions, triangles) = (&self.rest[..], &self.triangles[..]);
+        let shape = RestShape { positions, triangles, curved: false, grain: Vector3::z() };
+        Sheet::new(&shape, fabric, anchors).expect("a sheet")
     }
 
     pub fn places(&self) -> Vec<Vector3<f64>> {

@@ -1,5 +1,7 @@
 //! Friction on a slope.
 
+#![allow(clippy::unwrap_used)] // all of it is test code
+
 use nalgebra::Vector3;
 use toile_cloth::{Surroundings, obstacle::Plane};
 

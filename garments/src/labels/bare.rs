@@ -26,7 +26,7 @@ const WORN: [f32; PART_COUNT] = {
     [-6.0, -2.5, 3.5, 4.0, 0.5, -0.5, -5.0, 2.0, 0.3, 0.5]
 };
 /// How far a guessed body is off where skin is bare, metres (scale of a Laplacian), and how far cloth stands off (mean of an
-/// exponential): the misfit of arms and legs of generated people in trousers and T-shirt, and the ease of tailors.
+/// exponential): an assumption about a body that was guessed, and half of the ease of an ordinary shirt.
 const BODY_OFF: f32 = 0.006;
 const STANDS_OFF: f32 = 0.015;
 /// Neither height nor colour says more than this, nats.

@@ -52,3 +52,38 @@ impl Apart {
         (1..self.layers.len()).map(|upper| super::crossing_pairs(&self.layers, upper).len()).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sheet of 40 by 40 vertices, 4 mm apart, at `height(x, z)`, facing up.
+    fn sheet(height: impl Fn(f32, f32) -> f32) -> Mesh {
+        let n = 40u32;
+        let at = |v: u32| {
+            let (x, z) = ((v % n) as f32 * 0.004, (v / n) as f32 * 0.004);
+            Point3::new(x, height(x, z), z)
+        };
+        let cell = |q: u32| q / (n - 1) * n + q % (n - 1);
+        let cut = |a: u32| [[a, a + n, a + 1], [a + 1, a + n, a + n + 1]];
+        Mesh::new((0..n * n).map(at).collect(), (0..(n - 1) * (n - 1)).map(cell).flat_map(cut).collect())
+    }
+
+    #[test]
+    fn layers_that_move_are_parted_frame_by_frame_and_the_body_stays() {
+        let (body, inner, outer) = (sheet(|_, _| 0.0), sheet(|_, _| 0.003), sheet(|_, _| 0.006));
+        let mut apart = Apart::new(&[&body, &inner, &outer]);
+        for frame in 0..4 {
+            // Waves that run through the layers below.
+            let wave = |x: f32, z: f32| 0.004 * (60.0 * x + frame as f32).sin() * (50.0 * z).cos();
+            let below = sheet(|x, z| 0.003 + wave(x, z)).positions;
+            let mut layers = vec![body.positions.clone(), below, outer.positions.clone()];
+            assert!(apart.keep(&mut [body.positions.clone(), inner.positions.clone(), outer.positions.clone()]) == 0);
+            assert_eq!(apart.keep(&mut layers), 0);
+            assert_eq!(apart.crossing(), 0);
+            assert_eq!(layers[0], body.positions);
+            let moved = layers[2].iter().zip(&outer.positions).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max);
+            assert!(moved < 0.01, "{moved}");
+        }
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::BufWriter,
+    io::{BufWriter, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
@@ -10,8 +10,11 @@ use nalgebra::Point3;
 use toile_avatar::PointCache;
 use toile_capture::files::atomic_write;
 
-use super::AnimationReport;
+use super::report::AnimationReport;
 use crate::{PipelineError, json};
+
+/// Bytes of a point cache before its first sample.
+const HEADER: usize = 32;
 
 /// The point caches of a motion, while they are written.
 pub(super) struct Caches {
@@ -27,14 +30,11 @@ impl Caches {
             let (part, whole) = (folder.join(format!("{name}.pc2.part")), folder.join(format!("{name}.pc2")));
             let wrap = |e| PipelineError::io(&part, e);
             // What an interrupted run left; never through a link to somewhere else.
-            match fs::remove_file(&part) {
-                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(wrap(e)),
-                _ => {}
-            }
+            remove(&part)?;
             let file = File::create_new(&part).map_err(wrap)?;
             let samples = u32::try_from(frames).unwrap_or(u32::MAX);
             let cache = PointCache::begin(BufWriter::new(file), points, samples).map_err(wrap)?;
-            Ok((part, whole, cache))
+            Ok::<_, PipelineError>((part, whole, cache))
         };
         let layers = layers.iter().map(begin).collect::<Result<_, _>>()?;
         Ok(Self { folder: folder.to_path_buf(), layers })
@@ -48,19 +48,70 @@ impl Caches {
         Ok(())
     }
 
-    /// Puts the caches in their place, and the report last.
-    pub fn finish(self, report: &AnimationReport) -> Result<(), PipelineError> {
-        let report_path = self.folder.join("report.json");
-        match fs::remove_file(&report_path) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(PipelineError::io(&report_path, e)),
-            _ => {}
-        }
+    /// Ends all caches, so that they can be read.
+    pub fn written(self) -> Result<Written, PipelineError> {
+        let mut layers = Vec::with_capacity(self.layers.len());
         for (part, whole, cache) in self.layers {
             let wrap = |e| PipelineError::io(&part, e);
-            let out = cache.finish().map_err(wrap)?;
-            out.into_inner().map_err(|e| wrap(e.into_error()))?.sync_all().map_err(wrap)?;
-            fs::rename(&part, &whole).map_err(wrap)?;
+            let file = cache.finish().map_err(wrap)?.into_inner().map_err(|e| wrap(e.into_error()))?;
+            file.sync_all().map_err(wrap)?;
+            layers.push((part, whole));
         }
+        Ok(Written { folder: self.folder, layers })
+    }
+}
+
+/// Whole caches that are not in their place yet.
+pub(super) struct Written {
+    folder: PathBuf,
+    layers: Vec<(PathBuf, PathBuf)>,
+}
+
+impl Written {
+    /// The caches, to be read. `points` are the vertices of each layer.
+    pub fn open(&self, points: &[usize]) -> Result<Vec<Cached>, PipelineError> {
+        let open = |((part, _), &points): (&(PathBuf, PathBuf), &usize)| {
+            let file = File::open(part).map_err(|e| PipelineError::io(part, e))?;
+            Ok(Cached { path: part.clone(), file, points })
+        };
+        self.layers.iter().zip(points).map(open).collect()
+    }
+
+    /// Puts the caches and `glb` in their place, and the report last.
+    pub fn finish(self, glb: &[u8], report: &AnimationReport) -> Result<(), PipelineError> {
+        let report_path = self.folder.join("report.json");
+        remove(&report_path)?;
+        for (part, whole) in self.layers {
+            fs::rename(&part, &whole).map_err(|e| PipelineError::io(&part, e))?;
+        }
+        atomic_write(&self.folder.join("motion.glb"), glb)?;
         Ok(atomic_write(&report_path, &json::pretty(report)?)?)
+    }
+}
+
+/// A cache that is read.
+pub(super) struct Cached {
+    path: PathBuf,
+    file: File,
+    points: usize,
+}
+
+impl Cached {
+    /// The vertices in frame `f`.
+    pub fn frame(&mut self, f: usize) -> Result<Vec<Point3<f32>>, PipelineError> {
+        let wrap = |e| PipelineError::io(&self.path, e);
+        let mut bytes = vec![0; self.points * 12];
+        self.file.seek(SeekFrom::Start((HEADER + f * bytes.len()) as u64)).map_err(wrap)?;
+        self.file.read_exact(&mut bytes).map_err(wrap)?;
+        let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+        let points = bytes.chunks_exact(12);
+        Ok(points.map(|p| Point3::new(number(&p[..4]), number(&p[4..8]), number(&p[8..]))).collect())
+    }
+}
+
+fn remove(path: &Path) -> Result<(), PipelineError> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(PipelineError::io(path, e)),
+        _ => Ok(()),
     }
 }

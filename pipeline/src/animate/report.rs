@@ -7,7 +7,7 @@ use toile_animation::blend::{Blend, Outfit};
 use toile_character::Motion;
 use toile_geometry::statistics::{Rank, quantile_by};
 
-use super::AnimateOptions;
+use super::options::AnimateOptions;
 use crate::garment::Garment;
 
 /// `report.json` of a motion.

@@ -16,7 +16,8 @@ use crate::{
 
 const AFTER: &str = "\
 Writes SUBJECT/motion/NAME/: a point cache (PC2, metres, +Y up, vertices in the order of avatar.glb) for the body and each
-garment, and report.json. Blender shows them with the modifier Mesh Cache on the meshes of avatar.glb.
+garment, motion.glb (the same motion for any player of glTF, by helper joints), and report.json. Blender shows the caches with the
+modifier Mesh Cache on the meshes of avatar.glb.
 
 Cloth that lies on the body follows it, cloth that hangs swings, and layers are kept apart in every frame. What the avatar
 lacks is built first.
