@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use rayon::prelude::*;
-use toile_character::{Pose, Skeleton, Skinner};
+use toile_character::{Joint, Pose, Skeleton, SkinWeights, Skinner, skin::INFLUENCES};
 use toile_geometry::Mesh;
 
 use super::{anchors::Closeness, layer::OutfitLayer, proxy::Proxy, squeeze::Columns};
@@ -37,7 +37,7 @@ impl Outfit {
         let proxies: Result<Vec<Proxy>, AnimationError> =
             layers[1..].par_iter().map(|layer| Proxy::new(layer, &closeness)).collect();
         let meshes: Vec<&Mesh> = layers.iter().map(|l| &l.mesh).collect();
-        let columns = Columns::new(&meshes, &closeness);
+        let columns = Columns::new(&meshes, hands_and_feet(&body.weights), &closeness);
         Ok(Self { skeleton, pose0, proxies: proxies?, columns, skinners, layers })
     }
 
@@ -50,4 +50,13 @@ impl Outfit {
     pub fn scanned(&self, layer: usize) -> &[Point3<f32>] {
         &self.layers[layer].mesh.positions
     }
+}
+
+/// True for vertices that a hand, a finger or a foot moves most.
+fn hands_and_feet(weights: &SkinWeights) -> Vec<bool> {
+    let moves_most = |joints: &[u8; INFLUENCES]| Joint::from_index(usize::from(joints[0]));
+    let ends =
+        [Joint::LeftHand, Joint::RightHand, Joint::LeftFoot, Joint::RightFoot, Joint::LeftToes, Joint::RightToes];
+    let is_end = |joint: Joint| joint.is_finger() || ends.contains(&joint);
+    weights.joints.iter().map(|joints| moves_most(joints).is_some_and(is_end)).collect()
 }

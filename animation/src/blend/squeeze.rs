@@ -21,7 +21,7 @@ const MARGIN: f32 = 0.0020;
 const TALLEST: f32 = 0.15;
 /// Rounds of smoothing over the body's vertices.
 const SMOOTHINGS: usize = 12;
-/// Rings of vertices by which the excess of a column spreads before that.
+/// Rings of vertices by which too little room spreads before that.
 const WIDENINGS: usize = 4;
 
 /// The columns over the body.
@@ -32,9 +32,11 @@ pub(crate) struct Columns {
     depths: Vec<f32>,
     /// Height of the topmost layer over each vertex in the outfit's first pose, metres.
     tops: Vec<f32>,
+    /// True where no column stands: hands and feet, whose fingers and toes touch each other in any pose.
+    bare: Vec<bool>,
     /// For each garment, which of the layers over each vertex it is, from 1; the last tells how many there are.
     ranks: Vec<Vec<f32>>,
-    /// Excess of each column in the outfit's first pose, metres.
+    /// Room over each vertex in the outfit's first pose, metres.
     scanned: Vec<f32>,
     /// Where the vertices of each garment's mesh stand.
     over: Vec<Vec<Over>>,
@@ -52,7 +54,8 @@ pub(crate) struct Pressed {
 }
 
 impl Columns {
-    pub fn new(layers: &[&Mesh], closeness: &Closeness) -> Self {
+    /// The columns over the first of `layers`; none stand where it is `bare`.
+    pub fn new(layers: &[&Mesh], bare: Vec<bool>, closeness: &Closeness) -> Self {
         let body = layers[0];
         let n = body.positions.len();
         let neighbours = VertexNeighbors::new(n, &body.triangles);
@@ -80,48 +83,51 @@ impl Columns {
         }
         let tops = smoothed(&tops, &neighbours, 3);
         let (triangles, depths) = (body.triangles.clone(), depths(body));
-        let mut columns = Self { triangles, neighbours, depths, tops, ranks, over, scanned: Vec::new() };
-        columns.scanned = columns.excess(&body.positions, &body.vertex_normals());
+        let mut columns = Self { triangles, neighbours, depths, tops, bare, ranks, over, scanned: Vec::new() };
+        columns.scanned = columns.rooms(&body.positions, &body.vertex_normals());
         columns
     }
 
-    /// How much taller than the room that it has each column is, metres, at least 0, where the body stands at `body`.
-    fn excess(&self, body: &[Point3<f32>], normals: &[Vector3<f32>]) -> Vec<f32> {
+    /// Room over each vertex where the body stands at `body`, metres: half the way to another part of it, below 0 where they
+    /// overlap.
+    fn rooms(&self, body: &[Point3<f32>], normals: &[Vector3<f32>]) -> Vec<f32> {
         let bvh = Bvh::new(body, &self.triangles);
         let faces: Vec<Vector3<f32>> = toile_geometry::mesh::triangle_normals(body, &self.triangles);
-        let excess = |v: usize| {
+        let room = |v: usize| {
             let (n, depth) = (normals[v], self.depths[v]);
+            if self.bare[v] {
+                return TALLEST;
+            }
             let origin = body[v] - n * depth;
             let faces_us = |t: u32| faces[t as usize].dot(&n) < 0.0;
             let hit = bvh.ray_where(&origin, &n, depth + 2.0 * self.tops[v] + 2.0 * MARGIN, faces_us);
-            hit.map_or(0.0, |h| (self.tops[v] + MARGIN - (h.t - depth) / 2.0).max(0.0))
+            hit.map_or(TALLEST, |h| (h.t - depth) / 2.0)
         };
-        (0..body.len()).into_par_iter().map(excess).collect()
+        let less: Vec<f32> = (0..body.len()).into_par_iter().map(|v| -room(v)).collect();
+        // Wider than the smoothing reaches, so that it adds nothing where two parts meet.
+        let less = (0..WIDENINGS).fold(less, |less, _| widened(&less, &self.neighbours));
+        smoothed(&less, &self.neighbours, SMOOTHINGS).iter().map(|r| -r).collect()
     }
 
     /// How the columns are pressed where the body stands at `body`.
     pub fn press(&self, body: &[Point3<f32>]) -> Pressed {
         let normals = vertex_normals(body, &self.triangles);
-        let excess = self.excess(body, &normals);
-        // What lay so in the outfit's first pose was scanned so.
-        let excess: Vec<f32> = excess.iter().zip(&self.scanned).map(|(now, then)| (now - then).max(0.0)).collect();
-        // Wider than the smoothing reaches, so that it takes nothing off where two parts meet.
-        let excess = (0..WIDENINGS).fold(excess, |excess, _| widened(&excess, &self.neighbours));
-        let excess = smoothed(&excess, &self.neighbours, SMOOTHINGS);
-        let mut pressed = Pressed {
-            floor: vec![0.0; body.len()],
-            step: vec![0.0; body.len()],
-            share: vec![1.0; body.len()],
-            normals,
-        };
-        for (v, excess) in excess.iter().enumerate().filter(|(_, e)| **e > 1e-6) {
-            let (top, count) = (self.tops[v], self.ranks.last().map_or(0.0, |r| r[v]));
-            let room = top - excess;
+        let rooms = self.rooms(body, &normals);
+        let n = body.len();
+        let mut pressed = Pressed { floor: vec![0.0; n], step: vec![0.0; n], share: vec![1.0; n], normals };
+        for (v, &room) in rooms.iter().enumerate() {
+            // What had no more room in the outfit's first pose was scanned so.
+            let (scanned, count) = (self.scanned[v], self.ranks.last().map_or(0.0, |r| r[v]));
+            let top = self.tops[v].min(scanned);
+            if room >= top.min(scanned - MARGIN) || self.bare[v] {
+                continue;
+            }
             // Slowly at first, so that layers with room are not moved.
-            let step = THINNEST * (excess / (THINNEST * count.max(1.0))).min(1.0);
+            let step = THINNEST * ((top - room).max(0.0) / (THINNEST * count.max(1.0))).min(1.0);
+            let lowest = |room: f32| (room - MARGIN - step * count).min(0.0);
             pressed.step[v] = step;
-            pressed.floor[v] = (room - step * count).min(0.0);
-            let left = room - pressed.floor[v] - step * count;
+            pressed.floor[v] = (lowest(room) - lowest(scanned)).min(0.0);
+            let left = room - MARGIN - pressed.floor[v] - step * count;
             pressed.share[v] = if top > 1e-6 { (left / top).clamp(0.0, 1.0) } else { 0.0 };
         }
         pressed
@@ -159,7 +165,7 @@ impl Pressed {
                 over.corners.iter().zip(over.barycentric).map(|(&v, w)| values[v as usize] * w).sum()
             };
             let (floor, step, share) = (mix(&self.floor), mix(&self.step), mix(&self.share));
-            if step == 0.0 {
+            if floor == 0.0 && share == 1.0 {
                 return;
             }
             let at = |k: usize| over.corners[k] as usize;
