@@ -90,10 +90,10 @@ fn a_skirt_lags_swings_and_comes_to_rest() {
 fn skin_that_meets_skin_gives_way() {
     let (outfit, skeleton) = outfit();
     // Arms pressed to the sides, and into them.
-    const ANGLE: f64 = 0.55;
+    let angle = 0.55;
     let mut pose = Pose::identity();
-    *pose.rotation_mut(Joint::LeftUpperArm) = UnitQuaternion::from_euler_angles(0.0, 0.0, -ANGLE);
-    *pose.rotation_mut(Joint::RightUpperArm) = UnitQuaternion::from_euler_angles(0.0, 0.0, ANGLE);
+    *pose.rotation_mut(Joint::LeftUpperArm) = UnitQuaternion::from_euler_angles(0.0, 0.0, -angle);
+    *pose.rotation_mut(Joint::RightUpperArm) = UnitQuaternion::from_euler_angles(0.0, 0.0, angle);
     let mut wearer = Wearer::new(&outfit, Blend::Anchored, Skinning::Linear);
     wearer.advance(&pose, 1.0 / 30.0).unwrap();
     let body = &outfit.layers()[0];

@@ -22,6 +22,7 @@ fn help_shows_the_usual_way_and_every_command_has_an_example() {
         "edit",
         "reorder",
         "export",
+        "animate",
         "measure",
         "capture",
         "devices",
