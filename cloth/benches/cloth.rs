@@ -14,8 +14,8 @@ fn step(c: &mut Criterion) {
         (0..(n - 1) * (n - 1)).map(cell).flat_map(|a| [[a, a + n, a + 1], [a + 1, a + n, a + n + 1]]).collect();
     let stiffness = (0..n * n).map(|v| if v < n { 1e4 } else { 0.0 }).collect();
     let fabric = Fabric::named("shirting").expect("the table has it");
-    let mut sheet =
-        Sheet::new(&rest, &triangles, fabric, false, &Vector3::y(), Anchors { stiffness }).expect("a sheet");
+    let shape = RestShape { positions: &rest, triangles: &triangles, curved: false, grain: Vector3::y() };
+    let mut sheet = Sheet::new(&shape, fabric, Anchors { stiffness }).expect("a sheet");
     let anchors: Vec<Vector3<f64>> = rest.iter().map(|p| p.coords).collect();
     let around = Surroundings { anchors: &anchors, wind: Vector3::new(0.0, 0.0, 2.0), ..Surroundings::default() };
     c.bench_function("one step of 1/60 s, 4,900 vertices", |b| {
