@@ -29,7 +29,7 @@ fn walking() -> (Avatar, Vec<Vec<Vec<Point3<f32>>>>) {
     avatar.motions[0].poses.truncate(70);
     let mut caches = Vec::new();
     for (l, layer) in avatar.layers.iter().enumerate() {
-        let hem = [0.0, 0.45, 1.15][l];
+        let hem = [-1.0, 0.45, 1.15][l];
         let of_frame = |(f, pose): (usize, &Pose)| {
             let t = f as f32 * avatar.motions[0].frame_time as f32 * 6.0;
             let mut positions = skinning::skin(&layer.mesh.positions, &layer.weights, &moved(&avatar, pose));

@@ -144,13 +144,17 @@ fn bake(
     for (k, pose) in motion.poses.iter().enumerate() {
         let begun = Instant::now();
         wearer.advance(pose, motion.frame_time).map_err(|e| wrong(&e))?;
-        let mut crossing = 0;
+        let mut is_apart = false;
         if options.blend != Blend::Skinning {
             let mut layers = wearer.layers().to_vec();
-            crossing = apart.keep(&mut layers);
+            is_apart = apart.keep(&mut layers) == 0;
             wearer.correct(&layers).map_err(|e| wrong(&e))?;
         }
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
+        if options.blend == Blend::Skinning {
+            apart.look(wearer.layers());
+        }
+        let crossing = if is_apart { 0 } else { apart.crossing() };
         caches.add(wearer.layers())?;
         report.frames.push(FrameReport::of(&outfit, wearer.layers(), crossing, milliseconds));
         observer.at((k + 1) as f32 / motion.poses.len() as f32);

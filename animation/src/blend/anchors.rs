@@ -31,6 +31,8 @@ pub(crate) struct Over {
     pub barycentric: [f32; 3],
     /// Height over it along the body's normal, metres.
     pub height: f32,
+    /// Share by which it lies on the body by its kind: 0 for a part of a skirt or coat that hangs free.
+    pub held: f32,
 }
 
 impl<'a> Closeness<'a> {
@@ -39,14 +41,19 @@ impl<'a> Closeness<'a> {
         Self { body, normals: vertex_normals(&body.positions, &body.triangles), bvh }
     }
 
-    /// The place of the body that is nearest to `p`.
-    pub fn over(&self, p: &Point3<f32>) -> Option<Over> {
+    /// The place of the body that is nearest to `p`, of which the share `free` hangs free by its kind.
+    pub fn over(&self, p: &Point3<f32>, free: f32) -> Option<Over> {
         let hit = self.bvh.closest(p, f32::INFINITY)?;
         let corners = self.body.triangles[hit.triangle as usize];
         let normal: Vector3<f32> =
             corners.iter().zip(hit.barycentric).map(|(&v, w)| self.normals[v as usize] * w).sum();
         let side = (p - hit.point).dot(&normal).signum();
-        Some(Over { corners, barycentric: hit.barycentric, height: side * hit.distance })
+        Some(Over {
+            corners,
+            barycentric: hit.barycentric,
+            height: side * hit.distance,
+            held: (1.0 - free).clamp(0.0, 1.0),
+        })
     }
 }
 

@@ -38,7 +38,8 @@ impl Proxy {
         let edge = (layer.mesh.area() / (2.0 * VERTICES * 0.433)).sqrt().max(SHORTEST_EDGE);
         let mesh = remesh::isotropic(&layer.mesh, edge as f32);
         let (weights, free) = carried_over(&layer.mesh, &layer.weights, &mesh);
-        let over: Option<Vec<Over>> = mesh.positions.iter().map(|p| closeness.over(p)).collect();
+        let over: Option<Vec<Over>> =
+            mesh.positions.iter().zip(&free).map(|(p, free)| closeness.over(p, *free as f32)).collect();
         let over = over.ok_or_else(|| wrong("there is no body below it".into()))?;
         let distance = |v: usize| f64::from(over[v].height).max(0.0);
         let frequencies: Vec<f64> = (0..over.len()).map(|v| frequency(distance(v), free[v])).collect();

@@ -7,6 +7,7 @@
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
+use toile_character::FREE_PART;
 use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals, topology::VertexNeighbors};
 
 use super::anchors::{Closeness, Over};
@@ -63,9 +64,12 @@ impl Columns {
         let mut rank = vec![0.0f32; n];
         let (mut over, mut ranks) = (Vec::new(), Vec::new());
         for layer in &layers[1..] {
-            let places: Vec<Over> = layer.positions.par_iter().filter_map(|p| closeness.over(p)).collect();
+            let of_part = layer.attributes.get(FREE_PART);
+            let free = |v: usize| of_part.map_or(0.0, |part| part[v]);
+            let place = |(v, p): (usize, &Point3<f32>)| closeness.over(p, free(v));
+            let places: Vec<Over> = layer.positions.par_iter().enumerate().filter_map(place).collect();
             let mut covered = vec![0.0f32; n];
-            for place in places.iter().filter(|p| p.height < TALLEST) {
+            for place in places.iter().filter(|p| p.height < TALLEST && p.held > 0.5) {
                 for &v in &place.corners {
                     tops[v as usize] = tops[v as usize].max(place.height);
                     covered[v as usize] = 1.0;
@@ -173,7 +177,7 @@ impl Pressed {
             let Some(normal) = normal.try_normalize(1e-6) else { return };
             let skin: Vector3<f32> = (0..3).map(|k| body[at(k)].coords * over.barycentric[k]).sum();
             let height = (p.coords - skin).dot(&normal);
-            *p += normal * (floor + mix(ranks) * step + height * share - height);
+            *p += normal * (over.held * (floor + mix(ranks) * step + height * share - height));
         });
     }
 }

@@ -28,17 +28,25 @@ impl Apart {
         Self { layers: layers.par_iter().enumerate().map(new).collect(), settings }
     }
 
+    /// Looks at the layers where they are now, and moves none.
+    ///
+    /// # Panics
+    /// Where `positions` are of other layers than those that this was made for.
+    pub fn look(&mut self, positions: &[Vec<Point3<f32>>]) {
+        assert_eq!(positions.len(), self.layers.len(), "as many layers as before");
+        self.layers.par_iter_mut().zip(positions).for_each(|(layer, positions)| {
+            assert_eq!(layer.mesh().positions.len(), positions.len(), "as many vertices as before");
+            layer.surface.mesh.positions.clone_from(positions);
+            layer.surface.refresh();
+        });
+    }
+
     /// Moves the vertices of all layers but the first apart where they come too near. Returns how many places are left that are.
     ///
     /// # Panics
     /// Where `positions` are of other layers than those that this was made for.
     pub fn keep(&mut self, positions: &mut [Vec<Point3<f32>>]) -> usize {
-        assert_eq!(positions.len(), self.layers.len(), "as many layers as before");
-        self.layers.par_iter_mut().zip(&*positions).for_each(|(layer, positions)| {
-            assert_eq!(layer.mesh().positions.len(), positions.len(), "as many vertices as before");
-            layer.surface.mesh.positions.clone_from(positions);
-            layer.surface.refresh();
-        });
+        self.look(positions);
         let own = own_crossings(&self.layers);
         let (_, left) = settle(&mut self.layers, &own, &self.settings, Care::Frame, &|_| {});
         for (positions, layer) in positions.iter_mut().zip(&self.layers).skip(1) {
@@ -47,7 +55,7 @@ impl Apart {
         left.len()
     }
 
-    /// Pairs of triangles of different layers that cross now.
+    /// Pairs of triangles of different layers that cross now, by an exact test.
     pub fn crossing(&self) -> usize {
         (1..self.layers.len()).map(|upper| super::crossing_pairs(&self.layers, upper).len()).sum()
     }
