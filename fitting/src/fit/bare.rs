@@ -1,6 +1,6 @@
 //! The body of somebody dressed takes on the skin that is bare, and stays inside the clothes where it is not.
 
-use nalgebra::UnitQuaternion;
+use nalgebra::{Point3, UnitQuaternion};
 use toile_character::BodyModel;
 use toile_geometry::Mesh;
 
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     FitSettings, FittingError,
-    conform::conform,
+    conform::{ScanLandmark, conform},
     solve::State,
     surface::trust_of,
     under::{Inside, contained},
@@ -42,12 +42,33 @@ pub fn take_on_bare_skin(
     let inside = Inside::new(&scan);
     let as_undressed = FitSettings { dressed: false, ..settings.clone() };
     let points = conform(model, &state, &scan, inside.bvh(), &bare, &as_undressed, &fit.landmarks)?;
-    let points = contained(model, &points, (&scan, &trust), &inside);
+    let drawn_in = contained(model, &points, (&scan, &trust), &inside);
+    let points = kept_by_hand(model, &fit.landmarks, &points, drawn_in);
     fit.body = at_rest(model, &state, &points);
     fit.measurements = measured(model, &fit.body, &fit.pose);
     fit.seen = Coverage::new(model, &points, &scan, &bare, SKIN_COVERED).seen;
     fit.report.scan_to_body = Distances::new(&samples(&scan, &bare), &points, model).stats();
     Ok(fit)
+}
+
+/// Reach of a landmark that was set by hand over the skin around it, metres.
+const BY_HAND: f32 = 0.03;
+
+/// The points that were `drawn_in` by the clothes, but for what lies around landmarks set by hand: there as they were `before`.
+fn kept_by_hand(
+    model: &BodyModel,
+    landmarks: &[ScanLandmark],
+    before: &[Point3<f32>],
+    mut drawn_in: Vec<Point3<f32>>,
+) -> Vec<Point3<f32>> {
+    for landmark in landmarks.iter().filter(|l| l.by_hand) {
+        let Some(center) = model.landmark(&landmark.name).map(|v| before[v as usize]) else { continue };
+        for (p, before) in drawn_in.iter_mut().zip(before) {
+            let kept = (1.0 - (before - center).norm() / BY_HAND).max(0.0);
+            *p += (before - *p) * kept;
+        }
+    }
+    drawn_in
 }
 
 /// The scan as it was fitted: outward, turned by `rotation`.

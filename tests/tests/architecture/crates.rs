@@ -69,6 +69,7 @@ const TABLE: &[Row] = &[
             "character",
             "fitting",
             "garments",
+            "cloth",
             "animation",
             "avatar",
             "render",
