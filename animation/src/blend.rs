@@ -4,9 +4,9 @@
 //!
 //! 1. all layers follow the skeleton by their skin weights ([`toile_character::Skinner`]);
 //! 2. where parts of the body come so near to each other that the cloth between them has no room, the layers on either
-//!    side are pressed together in their order, and the body gives way where even that is not enough ([`squeeze`]);
+//!    side are pressed together in their order, and the body gives way where even that is not enough (`squeeze`);
 //! 3. a proxy of each garment is simulated, tied to the skinned place by springs that are the stiffer the closer the
-//!    cloth lies to the body ([`anchors`], [`proxy`]), and the scanned mesh rides on it ([`ride`]);
+//!    cloth lies to the body (`anchors`, `proxy`), and the scanned mesh rides on it (`ride`);
 //!
 //! [`Blend::Skinning`] ends after the first step. Whoever keeps the layers apart at full resolution afterwards tells the wearer
 //! where they came to lie ([`Wearer::correct`]): the next frame starts from there.
