@@ -49,8 +49,7 @@ impl Avatar {
     pub fn in_pose(&self, pose: &Pose) -> Result<Self, AvatarError> {
         self.validate()?;
         check_pose(pose).map_err(AvatarError::Skeleton)?;
-        let (from, to) = (self.pose0.joint_frames(&self.skeleton), pose.joint_frames(&self.skeleton));
-        let moved: Vec<_> = to.iter().zip(&from).map(|(to, from)| to * from.inverse()).collect();
+        let moved = pose.transforms_from(&self.pose0, &self.skeleton);
         let mut posed = self.clone();
         posed.pose0 = pose.clone();
         for layer in &mut posed.layers {

@@ -17,8 +17,7 @@ use toile_character::{Pose, skinning};
 
 /// `posed_from_avatar` of the skeleton's joints: what moves the avatar's meshes into `pose`.
 fn moved(avatar: &Avatar, pose: &Pose) -> Vec<Isometry3<f64>> {
-    let (from, to) = (avatar.pose0.joint_frames(&avatar.skeleton), pose.joint_frames(&avatar.skeleton));
-    to.iter().zip(&from).map(|(to, from)| to * from.inverse()).collect()
+    pose.transforms_from(&avatar.pose0, &avatar.skeleton)
 }
 
 /// An avatar that walks, and where the vertices of its layers are in each frame: the trousers swing below the knee and the top at its hem.

@@ -64,6 +64,12 @@ impl Pose {
         JOINTS.iter().map(|&j| frames[j.index()] * Translation3::from(-skeleton.position(j).coords)).collect()
     }
 
+    /// `posed_from_start` of every joint: what moves a mesh that is in pose `start` into this one.
+    pub fn transforms_from(&self, start: &Self, skeleton: &Skeleton) -> Vec<Isometry3<f64>> {
+        let frames = self.joint_frames(skeleton).into_iter().zip(start.joint_frames(skeleton));
+        frames.map(|(to, from)| to * from.inverse()).collect()
+    }
+
     /// Positions of the posed joints.
     pub fn joint_positions(&self, skeleton: &Skeleton) -> Vec<Point3<f64>> {
         self.joint_frames(skeleton).iter().map(|f| Point3::from(f.translation.vector)).collect()

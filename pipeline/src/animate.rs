@@ -6,7 +6,7 @@ mod playable;
 mod report;
 
 use std::{
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
     time::Instant,
 };
 
@@ -15,6 +15,7 @@ use toile_animation::{
     resample,
 };
 use toile_avatar::Avatar;
+use toile_capture::printable;
 use toile_character::{BodyModel, Motion};
 use toile_cloth::Fabric;
 use toile_garments::{Apart, ExtractionReport, GarmentType};
@@ -30,7 +31,7 @@ use crate::{
     options::MotionChoice,
     process::process,
     record, settings,
-    step::Step,
+    step::{Remarks, Step},
     steps::{cut::Cut, export},
 };
 
@@ -46,20 +47,21 @@ pub struct Animated {
     pub folder: PathBuf,
     /// The report, as it is in the folder.
     pub report: AnimationReport,
-    /// What the operator should know, a sentence each.
-    pub warnings: Vec<String>,
+    /// What the operator should know, also of what was built first.
+    pub remarks: Remarks,
 }
 
 /// Moves the layers of the subject at `root` through a motion and writes their vertices frame by frame; what the avatar lacks
 /// is built first. The caches appear when all are whole.
 ///
 /// # Errors
-/// [`PipelineError`] where a stage has no answer or a file cannot be read or written; nothing half-written is left in
-/// the motion's folder.
+/// [`PipelineError`] where a stage has no answer or a file cannot be read or written; caches of an earlier run stay, and what
+/// was begun is called `.part` until the next run replaces it.
 pub fn animate(root: &Path, options: &AnimateOptions, observer: &dyn Observer) -> Result<Animated, PipelineError> {
     let building = Options { settings: options.settings.clone(), ..Options::default() };
     let summary = process(root, Goal::Avatar, &building, observer)?;
-    let mut warnings = summary.remarks.warnings;
+    let mut remarks = summary.remarks;
+    remarks.warnings.extend(summary.notes);
     let settings = settings::read(Some(root), options.settings.as_deref())?;
     let run = Run::open(root, None, settings, observer)?;
     let model = BodyModel::load_default()?;
@@ -73,24 +75,39 @@ pub fn animate(root: &Path, options: &AnimateOptions, observer: &dyn Observer) -
         MotionChoice::File(path) => Some(path.clone()),
     };
     let moved = motion::load(path.as_deref(), &body.skinned, &run.settings.motion)?;
-    warnings.extend(moved.report.warnings.iter().map(|w| format!("motion {}: {w}", moved.motion.name)));
+    remarks.warnings.extend(moved.report.warnings.iter().map(|w| format!("motion {}: {w}", moved.motion.name)));
     let motion = resample(&moved.motion, options.fps);
     if motion.frame_time * options.fps > 1.01 {
         let (has, wanted) = (1.0 / motion.frame_time, options.fps);
-        warnings.push(format!("the motion has {has:.1} frames a second; the caches have as many, not {wanted}"));
+        remarks
+            .warnings
+            .push(format!("the motion has {has:.1} frames a second; the caches have as many, not {wanted}"));
     }
-    let folder = run.folders.root.join("motion").join(&motion.name);
+    let folder = folder(&run, &motion)?;
     observer.begin(&run.label("layers", "animate"), SECONDS * (motion.poses.len() * garments.len().max(1)) as f64);
     let report = bake(&avatar, &garments, &motion, options, &folder, observer)?;
     observer.end();
-    warnings.extend(report.warnings());
-    Ok(Animated { folder, report, warnings })
+    remarks.warnings.extend(report.warnings());
+    Ok(Animated { folder, report, remarks })
+}
+
+/// Where a motion's files lie.
+fn folder(run: &Run, motion: &Motion) -> Result<PathBuf, PipelineError> {
+    let all = run.folders.root.join("motion");
+    // The name comes from a file: it must stay inside.
+    match Path::new(&motion.name).components().next() {
+        Some(Component::Normal(name)) if name == motion.name.as_str() => Ok(all.join(name)),
+        _ => {
+            let reason = format!("`{}` is no name for a folder; rename the motion's file", printable(&motion.name));
+            Err(PipelineError::refused(&all, reason))
+        }
+    }
 }
 
 /// The garments that the last run stacked.
 fn garments(run: &Run) -> Result<Vec<Garment>, PipelineError> {
     let mut out = Vec::new();
-    for number in 1..run.layers.len() {
+    for number in run.first_garment()..run.layers.len() {
         let folder = run.folders.layer(&run.layers[number]);
         let cut: Option<Record<ExtractionReport>> = record::read(&folder, Cut::NAME)?;
         if let Some(cut) = cut.filter(|_| run.folders.garment(&run.layers[number]).is_file()) {

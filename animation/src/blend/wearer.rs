@@ -5,16 +5,17 @@ use rayon::prelude::*;
 use toile_character::{Pose, PosedSkin, Skinning};
 use toile_cloth::{Effort, MovingSurface, Obstacle, Sheet, Surroundings};
 
-use super::{Blend, outfit::Outfit};
+use super::{Blend, outfit::Outfit, squeeze::Pressed};
 use crate::AnimationError;
 
-/// Farthest that the body may move in one step of the simulation, metres: the reach of contact is twice that.
+/// Farthest that a joint moves in one step of the simulation, metres, where that needs no more steps than are taken: the reach of contact
+/// is twice that.
 const LONGEST_WAY: f32 = 0.015;
 /// Steps of the simulation in a frame: at least, at most.
 const STEPS: (usize, usize) = (2, 6);
 /// Rate at which the air and the layers below damp cloth that moves against the body, 1/s.
 const DRAG: f64 = 7.0;
-/// Deceleration by the cloth's own friction, m/s²: a twentieth of gravity, as cloth hangs in shapes that differ by so much.
+/// Deceleration by the cloth's own friction, m/s²: a twentieth of gravity, assumed.
 const DRY: f64 = 0.5;
 /// Time in which corrections fade, seconds: a step and a half of a walk.
 const FORGET: f64 = 1.5;
@@ -29,6 +30,10 @@ pub struct Wearer<'a> {
     /// Skinned and pressed places of the proxies at the end of the last step.
     carried: Vec<Vec<Vector3<f64>>>,
     body: MovingSurface,
+    /// The garments' sheets as lower layers of each other.
+    surfaces: Vec<MovingSurface>,
+    /// How the columns are pressed where the last step ended; the unpressed skin is that of `skins`.
+    pressed: Option<Pressed>,
     /// Where the vertices of each garment were moved to beside where cloth and skin take them, in their local frames.
     corrections: Vec<Vec<Vector3<f32>>>,
     skins: Vec<PosedSkin>,
@@ -45,13 +50,15 @@ impl<'a> Wearer<'a> {
             blend,
             way,
             pose: outfit.pose0.clone(),
-            carried: sheets.iter().map(|s| s.positions.clone()).collect(),
-            sheets,
             body: MovingSurface::new(&layers[0], &outfit.layers[0].mesh.triangles),
+            surfaces: sheets.iter().map(|s| MovingSurface::new(&points(&s.positions), s.triangles())).collect(),
+            pressed: None,
             corrections: layers[1..].iter().map(|l| vec![Vector3::zeros(); l.len()]).collect(),
             skins: layers.iter().map(|_| PosedSkin::with_frames()).collect(),
             proxy_skins: outfit.proxies.iter().map(|_| PosedSkin::with_frames()).collect(),
             layers,
+            carried: sheets.iter().map(|s| s.positions.clone()).collect(),
+            sheets,
             outfit,
         }
     }
@@ -101,7 +108,7 @@ impl<'a> Wearer<'a> {
     fn finish(&mut self, seconds: f64) {
         let outfit = self.outfit;
         let skin = self.layers[0].clone();
-        let pressed = outfit.columns.press(&skin);
+        let pressed = self.pressed.take().unwrap_or_else(|| outfit.columns.press(&skin));
         pressed.apply_to_body(&mut self.layers[0]);
         for (k, proxy) in outfit.proxies.iter().enumerate() {
             let fine = &mut self.layers[k + 1];
@@ -148,9 +155,7 @@ impl<'a> Wearer<'a> {
     }
 
     fn moved(&self, pose: &Pose) -> Vec<Isometry3<f64>> {
-        let outfit = self.outfit;
-        let (from, to) = (outfit.pose0.joint_frames(&outfit.skeleton), pose.joint_frames(&outfit.skeleton));
-        to.iter().zip(&from).map(|(to, from)| to * from.inverse()).collect()
+        pose.transforms_from(&self.outfit.pose0, &self.outfit.skeleton)
     }
 
     /// One step of the simulation.
@@ -174,18 +179,11 @@ impl<'a> Wearer<'a> {
         // Each layer meets the lower ones where they would be carried.
         let guesses: Vec<Vec<Vector3<f64>>> =
             self.sheets.iter().enumerate().map(|(k, s)| self.guess(k, s, &targets[k], h)).collect();
-        let surfaces: Vec<MovingSurface> = self
-            .sheets
-            .par_iter()
-            .zip(&guesses)
-            .map(|(sheet, guess)| {
-                let at = |x: &[Vector3<f64>]| x.iter().map(|p| Point3::from(p.cast::<f32>())).collect::<Vec<_>>();
-                let mut surface = MovingSurface::new(&at(&sheet.positions), sheet.triangles());
-                surface.move_to(&at(guess));
-                surface
-            })
-            .collect();
-        let (body, proxy_skins) = (&self.body, &self.proxy_skins);
+        self.surfaces.par_iter_mut().zip(&self.sheets).zip(&guesses).for_each(|((surface, sheet), guess)| {
+            surface.move_to(&points(&sheet.positions));
+            surface.move_to(&points(guess));
+        });
+        let (body, surfaces, proxy_skins) = (&self.body, &self.surfaces, &self.proxy_skins);
         let results: Vec<Result<(), toile_cloth::ClothError>> = self
             .sheets
             .par_iter_mut()
@@ -208,6 +206,7 @@ impl<'a> Wearer<'a> {
             .collect();
         results.into_iter().collect::<Result<(), _>>().map_err(|e| wrong(&e))?;
         self.carried = targets;
+        self.pressed = Some(pressed);
         Ok(())
     }
 
@@ -220,6 +219,10 @@ impl<'a> Wearer<'a> {
         };
         (0..sheet.len()).map(place).collect()
     }
+}
+
+fn points(places: &[Vector3<f64>]) -> Vec<Point3<f32>> {
+    places.iter().map(|p| Point3::from(p.cast::<f32>())).collect()
 }
 
 /// Gravity, less what held the scanned shape against it: that turns with the body, so that cloth hangs as it was scanned

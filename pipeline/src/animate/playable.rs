@@ -18,14 +18,15 @@ pub(super) fn glb(
     folder: &Path,
 ) -> Result<Vec<u8>, PipelineError> {
     let wrong = |e: &dyn std::fmt::Display| PipelineError::refused(folder, format!("motion.glb: {e}"));
-    let mut avatar = Avatar { motions: vec![motion.clone()], ..avatar.clone() };
+    let moved = |pose: &Pose| pose.transforms_from(&avatar.pose0, &avatar.skeleton);
+    let mut hung = Avatar { motions: vec![motion.clone()], ..avatar.clone() };
     let kept = sample_frames(motion.poses.len());
-    let joints: Vec<Vec<Isometry3<f64>>> = kept.iter().map(|&f| moved(&avatar, &motion.poses[f])).collect();
+    let joints: Vec<Vec<Isometry3<f64>>> = kept.iter().map(|&f| moved(&motion.poses[f])).collect();
     let frames = cached
         .iter_mut()
         .map(|layer| kept.iter().map(|&f| layer.frame(f)).collect::<Result<Vec<Vec<Point3<f32>>>, _>>())
         .collect::<Result<Vec<_>, _>>()?;
-    let layers: Vec<LayerMotion> = avatar
+    let layers: Vec<LayerMotion> = hung
         .layers
         .iter()
         .zip(&frames)
@@ -34,27 +35,21 @@ pub(super) fn glb(
     let found = decompose(&layers, &joints, &DecompositionSettings::default()).map_err(|e| wrong(&e))?;
     drop(frames);
     let mut helpers = HelperJoints { frames: vec![Vec::new(); motion.poses.len()], ..HelperJoints::default() };
-    for (layer, avatar_layer) in found.iter().zip(&avatar.layers) {
+    for (layer, avatar_layer) in found.iter().zip(&hung.layers) {
         for (h, center) in layer.centers.iter().enumerate() {
             helpers.names.push(format!("{} helper {}", avatar_layer.name, h + 1));
             helpers.centers.push(*center);
         }
     }
     for (f, pose) in motion.poses.iter().enumerate() {
-        let joints = moved(&avatar, pose);
+        let joints = moved(pose);
         for (layer, cached) in found.iter().zip(&mut *cached).filter(|(l, _)| !l.centers.is_empty()) {
             let solved = layer.solve(&joints, &cached.frame(f)?).map_err(|e| wrong(&e))?;
             helpers.frames[f].extend(solved.iter().map(|t| t.cast::<f32>()));
         }
     }
-    for (layer, found) in avatar.layers.iter_mut().zip(found) {
+    for (layer, found) in hung.layers.iter_mut().zip(found) {
         layer.weights = found.weights;
     }
-    write_glb_with_helpers(&avatar, &helpers).map_err(|e| wrong(&e))
-}
-
-/// `posed_from_avatar` of the skeleton's joints.
-fn moved(avatar: &Avatar, pose: &Pose) -> Vec<Isometry3<f64>> {
-    let (from, to) = (avatar.pose0.joint_frames(&avatar.skeleton), pose.joint_frames(&avatar.skeleton));
-    to.iter().zip(&from).map(|(to, from)| to * from.inverse()).collect()
+    write_glb_with_helpers(&hung, &helpers).map_err(|e| wrong(&e))
 }

@@ -66,7 +66,7 @@ impl AnimationReport {
             fps: 1.0 / motion.frame_time,
             blend: options.blend,
             skinning: options.skinning.name(),
-            garments: garments.iter().map(|g| g.layer.clone()).collect(),
+            garments: garments.iter().map(|g| g.name.clone()).collect(),
             ms_a_frame: [0.0; 2],
             crossing_mean: 0.0,
             frames: Vec::with_capacity(motion.poses.len()),

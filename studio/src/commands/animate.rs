@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde_json::json;
 use toile_capture::printable_path;
 use toile_character::Skinning;
-use toile_pipeline::{AnimateOptions, Animated, Blend, animate};
+use toile_pipeline::{AnimateOptions, Animated, Blend, Remarks, animate};
 
 use crate::{
     StudioError,
@@ -19,8 +19,8 @@ Writes SUBJECT/motion/NAME/: a point cache (PC2, metres, +Y up, vertices in the 
 garment, motion.glb (the same motion for any player of glTF, by helper joints), and report.json. Blender shows the caches with the
 modifier Mesh Cache on the meshes of avatar.glb.
 
-Cloth that lies on the body follows it, cloth that hangs swings, and layers are kept apart in every frame. What the avatar
-lacks is built first.
+Cloth that lies on the body follows it, cloth that hangs swings, and layers that come through each other are moved apart;
+report.json counts what still crosses in each frame. What the avatar lacks is built first.
 
 Examples:
   toile animate anna
@@ -91,7 +91,7 @@ impl Animate {
             },
             settings: self.settings.clone(),
         };
-        let Animated { folder, report, warnings } = animate(&self.subject, &options, session.progress.as_ref())?;
+        let Animated { folder, report, remarks } = animate(&self.subject, &options, session.progress.as_ref())?;
         let text = format!(
             "{}\n{} frames, {:.0} ms a frame (95 %: {:.0} ms), {:.1} pairs of triangles cross on average\n",
             printable_path(&folder),
@@ -101,6 +101,7 @@ impl Animate {
             report.crossing_mean,
         );
         let results = json!({ "folder": printable_path(&folder), "report": report });
-        Ok(Answer { text, results, warnings, ..Answer::default() })
+        let Remarks { warnings, lost, failures } = remarks;
+        Ok(Answer { text, results, warnings, lost, failures })
     }
 }
