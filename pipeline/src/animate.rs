@@ -183,3 +183,19 @@ fn bake(
     written.finish(&glb, &report)?;
     Ok(report)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Settings, observer::Silent};
+
+    #[test]
+    fn a_motion_stays_inside_its_subject_whatever_its_file_is_called() {
+        let run = Run::single(Path::new("/anna"), "anna", Settings::default(), &Silent);
+        let named = |name: &str| folder(&run, &Motion { name: name.into(), frame_time: 0.1, poses: Vec::new() });
+        assert_eq!(named("dance 2").unwrap(), Path::new("/anna/motion/dance 2"));
+        for name in ["..", ".", "", "/etc", "a/b", "../x"] {
+            assert!(named(name).unwrap_err().to_string().contains("no name for a folder"), "{name}");
+        }
+    }
+}

@@ -16,6 +16,7 @@ mod prepare;
 mod problem;
 mod report;
 mod resolution;
+mod rules;
 mod search;
 mod seed;
 mod starts;
