@@ -8,19 +8,24 @@
 //! 3. a proxy of each garment is simulated, tied to the skinned place by springs that are the stiffer the closer the
 //!    cloth lies to the body (`anchors`, `proxy`), and the scanned mesh rides on it (`ride`);
 //!
+//! Before all of that, [`Clothed::make_room`] holds the arms of the motion as far from the body as the clothes between them need.
+//!
 //! [`Blend::Skinning`] ends after the first step. Whoever keeps the layers apart at full resolution afterwards tells the wearer
 //! where they came to lie ([`Wearer::correct`]): the next frame starts from there.
 
 mod anchors;
 mod layer;
+mod loft;
 mod outfit;
 mod proxy;
 mod ride;
+mod room;
 mod squeeze;
 mod wearer;
 
 pub use layer::OutfitLayer;
 pub use outfit::Outfit;
+pub use room::{Clothed, Room};
 pub use wearer::Wearer;
 
 use serde::{Deserialize, Serialize};

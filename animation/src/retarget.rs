@@ -23,6 +23,7 @@ pub use resample::resample;
 
 use crate::{
     AnimationError, Bvh,
+    blend::Room,
     bvh::FRAME_TIMES,
     skeleton::{Source, recognise},
 };
@@ -46,11 +47,21 @@ pub struct RetargetSettings {
     pub fingers: bool,
     /// Lift feet that would dip below the floor, by bending the knee. Default true.
     pub lift_feet: bool,
+    /// Hold arms as far from the body as the clothes between them need. Default true.
+    pub room_for_clothes: bool,
 }
 
 impl Default for RetargetSettings {
     fn default() -> Self {
-        Self { max_rate: 30.0, face_front: true, in_place: false, looped: false, fingers: true, lift_feet: true }
+        Self {
+            max_rate: 30.0,
+            face_front: true,
+            in_place: false,
+            looped: false,
+            fingers: true,
+            lift_feet: true,
+            room_for_clothes: true,
+        }
     }
 }
 
@@ -80,6 +91,9 @@ pub struct RetargetReport {
     pub poses: usize,
     /// Depth of the lower foot's sole below the floor, 98th percentile over the poses, metres.
     pub foot_below_floor: f64,
+    /// How far arms are held from the body to make room for clothes, where that was done.
+    #[serde(default)]
+    pub room: Room,
     /// Problems of the motion file that could be put right, a sentence each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -121,6 +135,7 @@ pub fn retarget(
         joints: source.named(bvh),
         poses: motion.poses.len(),
         foot_below_floor: ground::depth_below_floor(target, &motion.poses),
+        room: Room::default(),
         warnings: bvh.warnings.clone(),
     };
     Ok(Retargeted { motion, report })

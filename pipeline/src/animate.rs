@@ -27,7 +27,6 @@ use crate::{
     avatar_choice::AvatarChoice,
     body_file::Body,
     garment::Garment,
-    motion,
     options::MotionChoice,
     process::process,
     record, settings,
@@ -68,13 +67,14 @@ pub fn animate(root: &Path, options: &AnimateOptions, observer: &dyn Observer) -
     let body = Body::load(&run.folders, run.first_layer(), &model)?;
     let choice = AvatarChoice::read(&run.folders)?;
     let garments = garments(&run)?;
-    let avatar = export::Export { run: &run, body: &body, garments: &garments, choice: &choice }.avatar()?;
+    let export = export::Export { run: &run, body: &body, garments: &garments, choice: &choice };
     let path = match &options.motion {
         MotionChoice::AsBefore => choice.motion_path(&run.folders),
         MotionChoice::Walk => None,
         MotionChoice::File(path) => Some(path.clone()),
     };
-    let moved = motion::load(path.as_deref(), &body.skinned, &run.settings.motion)?;
+    let moved = export.moved(path.as_deref(), &export.dressed()?)?;
+    let avatar = export.avatar()?;
     remarks.warnings.extend(moved.report.warnings.iter().map(|w| format!("motion {}: {w}", moved.motion.name)));
     let motion = resample(&moved.motion, options.fps);
     if motion.frame_time * options.fps > 1.01 {

@@ -2,11 +2,16 @@
 
 use std::path::Path;
 
-use toile_animation::{AnimationError, Bvh, RetargetSettings, Retargeted, bvh, bvh::RestJoint, retarget, shipped_walk};
+use toile_animation::{
+    AnimationError, Bvh, RetargetSettings, Retargeted, blend::Clothed, bvh, bvh::RestJoint, retarget, shipped_walk,
+};
 use toile_avatar::{MotionJoint, read_motion};
 use toile_capture::files::read_limited;
-use toile_character::{BodyModel, Skeleton, SkinnedMesh, soles::Soles};
-use toile_geometry::statistics::{Rank, quantile_by};
+use toile_character::{BodyModel, Pose, Skeleton, SkinnedMesh, soles::Soles};
+use toile_geometry::{
+    Mesh,
+    statistics::{Rank, quantile_by},
+};
 
 use crate::PipelineError;
 
@@ -28,6 +33,37 @@ pub fn load(path: Option<&Path>, body: &SkinnedMesh, settings: &RetargetSettings
     }
     Ok(moved)
 }
+
+/// As [`load`], for somebody who wears the garments among `layers` (the first is the body, which is in `pose0`): arms are held as far
+/// from the body as the clothes need, where the settings say so.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_clothed(
+    path: Option<&Path>,
+    body: &SkinnedMesh,
+    pose0: &Pose,
+    layers: &[&Mesh],
+    settings: &RetargetSettings,
+) -> Result<Retargeted, PipelineError> {
+    let mut moved = load(path, body, settings)?;
+    if let Some(clothed) =
+        Clothed::new(&body.skeleton, pose0, layers, &body.weights).filter(|_| settings.room_for_clothes)
+    {
+        moved.report.room = clothed.make_room(&mut moved.motion);
+    }
+    let furthest = moved.report.room.largest.iter().copied().fold(0.0, f64::max).to_degrees();
+    if furthest > NOTICED {
+        moved.report.warnings.push(format!(
+            "arms are held up to {furthest:.0}° further from the body than the file has them: what is worn needs the room \
+             (motion.room_for_clothes = false leaves them as they are)"
+        ));
+    }
+    Ok(moved)
+}
+
+/// Degrees by which an arm is turned before that is said: an elbow moves by 25 mm.
+const NOTICED: f64 = 5.0;
 
 /// Checks a motion before any work is done: read it, and carry it onto the mean person.
 ///
@@ -82,8 +118,7 @@ fn read_gltf(path: &Path) -> Result<Bvh, PipelineError> {
 mod tests {
     use nalgebra::Point3;
     use toile_avatar::{Avatar, AvatarLayer, write_glb};
-    use toile_character::{JointNaming, Pose, SkinWeights};
-    use toile_geometry::Mesh;
+    use toile_character::{JointNaming, SkinWeights};
 
     use super::*;
 

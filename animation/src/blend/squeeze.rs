@@ -7,22 +7,20 @@
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-use toile_character::FREE_PART;
 use toile_geometry::{Mesh, bvh::Bvh, mesh::vertex_normals, topology::VertexNeighbors};
 
-use super::anchors::{Closeness, Over};
+use super::{
+    anchors::{Closeness, Over},
+    loft::{Loft, TALLEST, THINNEST, smoothed, widened},
+};
 
 /// Deepest that another part of the body is looked for below the skin, metres.
 const DEPTH: f32 = 0.05;
-// The next six were chosen by trying, on three subjects in one walk, until the layers could be moved apart: no model of flesh or
+// The next three were chosen by trying, on three subjects in one walk, until the layers could be moved apart: no model of flesh or
 // cloth stands behind them.
 
-/// Thinnest that a layer can be pressed, metres.
-const THINNEST: f32 = 0.0015;
 /// Room left between what belongs to either side, metres.
 const MARGIN: f32 = 0.0020;
-/// Cloth above this height does not stand in the column, metres: it hangs free.
-const TALLEST: f32 = 0.15;
 /// Rounds of smoothing over the body's vertices.
 const SMOOTHINGS: usize = 12;
 /// Rings of vertices by which too little room spreads before that.
@@ -36,16 +34,12 @@ pub(crate) struct Columns {
     bvh: Bvh,
     /// How deep below the skin a ray may start and still be inside this part of the body, metres.
     depths: Vec<f32>,
-    /// Height of the topmost layer over each vertex in the outfit's first pose, metres.
-    tops: Vec<f32>,
+    /// How high the layers stand over each vertex in the outfit's first pose.
+    loft: Loft,
     /// True where no column stands: hands and feet, whose fingers and toes touch each other in any pose.
     bare: Vec<bool>,
-    /// For each garment, which of the layers over each vertex it is, from 1; the last tells how many there are.
-    ranks: Vec<Vec<f32>>,
     /// Room over each vertex in the outfit's first pose, metres.
     scanned: Vec<f32>,
-    /// Where the vertices of each garment's mesh stand.
-    over: Vec<Vec<Over>>,
 }
 
 /// How the columns are pressed in one pose.
@@ -65,35 +59,10 @@ impl Columns {
         let body = layers[0];
         let n = body.positions.len();
         let neighbours = VertexNeighbors::new(n, &body.triangles);
-        let mut tops = vec![0.0f32; n];
-        let mut rank = vec![0.0f32; n];
-        let (mut over, mut ranks) = (Vec::new(), Vec::new());
-        for layer in &layers[1..] {
-            let of_part = layer.attributes.get(FREE_PART);
-            let free = |v: usize| of_part.map_or(0.0, |part| part[v]);
-            let place = |(v, p): (usize, &Point3<f32>)| closeness.over(p, free(v));
-            let places: Vec<Over> = layer.positions.par_iter().enumerate().filter_map(place).collect();
-            let mut covered = vec![0.0f32; n];
-            for place in places.iter().filter(|p| p.height < TALLEST && p.held > 0.5) {
-                for &v in &place.corners {
-                    tops[v as usize] = tops[v as usize].max(place.height);
-                    covered[v as usize] = 1.0;
-                }
-            }
-            for _ in 0..3 {
-                covered = widened(&covered, &neighbours);
-            }
-            rank.iter_mut().zip(smoothed(&covered, &neighbours, 3)).for_each(|(r, one)| *r += one);
-            ranks.push(rank.clone());
-            over.push(places);
-        }
-        for _ in 0..3 {
-            tops = widened(&tops, &neighbours);
-        }
-        let tops = smoothed(&tops, &neighbours, 3);
+        let loft = Loft::new(&layers[1..], closeness, &neighbours, n);
         let bvh = Bvh::new(&body.positions, &body.triangles);
         let (triangles, depths) = (body.triangles.clone(), depths(body, &bvh));
-        let mut columns = Self { triangles, neighbours, bvh, depths, tops, bare, ranks, over, scanned: Vec::new() };
+        let mut columns = Self { triangles, neighbours, bvh, depths, loft, bare, scanned: Vec::new() };
         columns.scanned = columns.rooms(&body.positions, &body.vertex_normals());
         columns
     }
@@ -111,7 +80,7 @@ impl Columns {
             }
             let origin = body[v] - n * depth;
             let faces_us = |t: u32| faces[t as usize].dot(&n) < 0.0;
-            let hit = bvh.ray_where(&origin, &n, depth + 2.0 * self.tops[v] + 2.0 * MARGIN, faces_us);
+            let hit = bvh.ray_where(&origin, &n, depth + 2.0 * self.loft.tops[v] + 2.0 * MARGIN, faces_us);
             hit.map_or(TALLEST, |h| (h.t - depth) / 2.0)
         };
         let less: Vec<f32> = (0..body.len()).into_par_iter().map(|v| -room(v)).collect();
@@ -128,8 +97,8 @@ impl Columns {
         let mut pressed = Pressed { floor: vec![0.0; n], step: vec![0.0; n], share: vec![1.0; n], normals };
         for (v, &room) in rooms.iter().enumerate() {
             // What had no more room in the outfit's first pose was scanned so.
-            let (scanned, count) = (self.scanned[v], self.ranks.last().map_or(0.0, |r| r[v]));
-            let top = self.tops[v].min(scanned);
+            let (scanned, count) = (self.scanned[v], self.loft.count(v));
+            let top = self.loft.tops[v].min(scanned);
             if room >= top.min(scanned - MARGIN) || self.bare[v] {
                 continue;
             }
@@ -153,12 +122,12 @@ impl Columns {
         over: &[Over],
         positions: &mut [Point3<f32>],
     ) {
-        pressed.apply(body, over, &self.ranks[k], positions);
+        pressed.apply(body, over, &self.loft.ranks[k], positions);
     }
 
     /// Presses the vertices of garment `k`'s mesh.
     pub fn apply(&self, pressed: &Pressed, body: &[Point3<f32>], k: usize, positions: &mut [Point3<f32>]) {
-        pressed.apply(body, &self.over[k], &self.ranks[k], positions);
+        pressed.apply(body, &self.loft.over[k], &self.loft.ranks[k], positions);
     }
 }
 
@@ -198,23 +167,4 @@ fn depths(body: &Mesh, bvh: &Bvh) -> Vec<f32> {
         (0.4 * through).min(DEPTH)
     };
     (0..body.positions.len()).into_par_iter().map(depth).collect()
-}
-
-/// Each value, or a neighbour's larger one.
-fn widened(values: &[f32], neighbours: &VertexNeighbors) -> Vec<f32> {
-    let largest = |v: usize| neighbours.of(v).iter().map(|&u| values[u as usize]).fold(values[v], f32::max);
-    (0..values.len()).map(largest).collect()
-}
-
-fn smoothed(values: &[f32], neighbours: &VertexNeighbors, rounds: usize) -> Vec<f32> {
-    let mut values = values.to_vec();
-    for _ in 0..rounds {
-        let mean = |v: usize| {
-            let around = neighbours.of(v);
-            let sum: f32 = around.iter().map(|&u| values[u as usize]).sum();
-            if around.is_empty() { values[v] } else { 0.5 * values[v] + 0.5 * sum / around.len() as f32 }
-        };
-        values = (0..values.len()).map(mean).collect();
-    }
-    values
 }

@@ -292,4 +292,5 @@ pub const FIELDS: &[Field] = &[
     switch("motion.looped", "Cut and blend the motion so that its end goes over into its start, in place."),
     switch("motion.fingers", "Turn finger joints where the source has them."),
     switch("motion.lift_feet", "Lift feet that would dip below the floor, by bending the knee."),
+    switch("motion.room_for_clothes", "Hold arms as far from the body as the clothes between them need."),
 ];

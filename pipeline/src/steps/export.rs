@@ -3,14 +3,18 @@
 //! Reads the body, every garment with its weights, and the motion. Writes `avatar.glb` and `avatar.vrm`, on request
 //! without what clothes hide.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use toile_animation::RetargetReport;
+use toile_animation::{RetargetReport, Retargeted};
 use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, write_glb, write_vrm};
 use toile_character::JointNaming;
 use toile_garments::{CullSettings, GarmentError, Worn, hidden_triangles};
+use toile_geometry::Mesh;
 
 use crate::{
     PipelineError, Run,
@@ -73,8 +77,17 @@ impl Export<'_> {
         Ok(avatar)
     }
 
+    /// A motion, or the walk, as this `avatar` moves with what it wears.
+    ///
+    /// # Errors
+    /// [`PipelineError`] where the file is no motion.
+    pub(crate) fn moved(&self, path: Option<&Path>, avatar: &Avatar) -> Result<Retargeted, PipelineError> {
+        let layers: Vec<&Mesh> = avatar.layers.iter().map(|l| &l.mesh).collect();
+        motion::load_clothed(path, &self.body.skinned, &self.body.pose0, &layers, &self.run.settings.motion)
+    }
+
     /// The avatar at rest in scan 0's pose: the body and every garment.
-    fn dressed(&self) -> Result<Avatar, PipelineError> {
+    pub(crate) fn dressed(&self) -> Result<Avatar, PipelineError> {
         let (folders, body) = (&self.run.folders, &self.body.skinned);
         let (name, weights) = ("body".to_string(), body.weights.clone());
         let mesh = read_mesh(&folders.body_mesh())?;
@@ -99,7 +112,7 @@ impl Export<'_> {
 impl Step for Export<'_> {
     type Report = Exported;
     const NAME: &'static str = "export";
-    const VERSION: u32 = 6;
+    const VERSION: u32 = 7;
     const SECONDS: f64 = 1.0;
 
     fn label(&self) -> String {
@@ -134,8 +147,8 @@ impl Step for Export<'_> {
     fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<Exported>, PipelineError> {
         let glb_path = self.run.folders.glb();
         let wrong = |e: AvatarError| PipelineError::stage(&glb_path, e);
-        let moved = motion::load(self.motion_path().as_deref(), &self.body.skinned, &self.run.settings.motion)?;
         let mut avatar = self.dressed()?;
+        let moved = self.moved(self.motion_path().as_deref(), &avatar)?;
         let left_out = match &self.choice.hidden {
             Some(settings) => {
                 leave_out_hidden(&mut avatar, settings).map_err(|e| PipelineError::stage(&glb_path, e))?

@@ -157,9 +157,12 @@ impl Page<'_> {
     ) -> Result<Vec<(String, Vec<Mesh>)>, PipelineError> {
         let (skeleton, pose0) = (&self.body.skinned.skeleton, &self.body.pose0);
         let path = self.choice.motion_path(&self.run.folders);
-        let motion: Motion = motion::load(path.as_deref(), &self.body.skinned, &self.run.settings.motion)?.motion;
         let mut layers = vec![(body_mesh, &self.body.skinned.weights)];
         layers.extend(worn.iter().map(|(mesh, weights)| (mesh, weights)));
+        let meshes: Vec<&Mesh> = layers.iter().map(|l| l.0).collect();
+        let settings = &self.run.settings.motion;
+        let motion: Motion =
+            motion::load_clothed(path.as_deref(), &self.body.skinned, pose0, &meshes, settings)?.motion;
         let rest_from_pose0 = pose0.skinning_transforms(skeleton);
         let rest: Vec<_> =
             layers.iter().map(|(mesh, w)| skinning::unskin(&mesh.positions, w, &rest_from_pose0)).collect();
