@@ -48,18 +48,26 @@ use crate::{
     settings::{StackMethod, StackSettings},
 };
 
-/// Limit of the times that all layers are looked at, for a result that stays.
-const PASSES: usize = 6;
-/// The same for one frame of many.
-const FRAME_PASSES: usize = 3;
-
 /// How much work is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Care {
-    /// A result that stays: believed only after everything was looked at afresh.
+    /// A result that stays: layers keep their gaps, which is believed only after everything was looked at afresh.
     Lasting,
-    /// One frame of many.
+    /// One frame of many: layers do not cross.
     Frame,
+}
+
+impl Care {
+    /// Limit of the times that all layers are looked at.
+    fn passes(self) -> usize {
+        if self == Self::Frame { 3 } else { 6 }
+    }
+
+    /// Vertices this far from a place where layers come too near may move, metres. From one frame to the next layers come into each
+    /// other by millimetres.
+    fn margin(self) -> f32 {
+        if self == Self::Frame { 0.025 } else { 0.06 }
+    }
 }
 
 /// Moves the `layers` (inside to outside, in the pose of `body`) so that each lies outside the body and all layers
@@ -148,10 +156,13 @@ fn settle(
     let mut contacts = Contacts::new(layers);
     let mut own = own_before.to_vec();
     let (mut rounds, mut fresh) = (0, true);
-    let passes = if care == Care::Frame { FRAME_PASSES } else { PASSES };
-    for pass in 0..passes {
-        let left = too_near(&mut contacts, layers, settings);
-        let regions = regions(left.iter().map(|c| place(layers, c)).chain(tangled(layers, &own)));
+    for pass in 0..care.passes() {
+        let left = match care {
+            Care::Lasting => too_near(&mut contacts, layers, settings),
+            Care::Frame => contacts.crossings(layers, 1.0),
+        };
+        let places = left.iter().map(|c| place(layers, c)).chain(tangled(layers, &own));
+        let regions = regions(places, care.margin());
         if regions.is_empty() && (fresh || care == Care::Frame) {
             return (rounds, left);
         }
@@ -166,15 +177,15 @@ fn settle(
         let still = solved.iter().all(|s| s.0.is_empty());
         let moved = apply(layers, solved, &regions, &mut contacts, settings);
         own = own_crossings_after(layers, &own, &moved);
-        progress((pass + 1) as f32 / passes as f32);
+        progress((pass + 1) as f32 / care.passes() as f32);
         if still {
             break;
         }
     }
-    if care == Care::Lasting {
-        contacts = Contacts::new(layers);
+    match care {
+        Care::Lasting => (rounds, too_near(&mut Contacts::new(layers), layers, settings)),
+        Care::Frame => (rounds, contacts.crossings(layers, 1.0)),
     }
-    (rounds, too_near(&mut contacts, layers, settings))
 }
 
 /// Where a contact is.

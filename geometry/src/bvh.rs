@@ -8,6 +8,7 @@ pub(crate) mod build;
 mod closest;
 mod far_field;
 mod overlap;
+mod pairs;
 mod ray;
 #[cfg(test)]
 mod tests;

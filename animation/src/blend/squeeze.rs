@@ -89,6 +89,18 @@ impl Columns {
         smoothed(&less, &self.neighbours, SMOOTHINGS).iter().map(|r| -r).collect()
     }
 
+    /// Between how they were pressed `before`, if they were, and `after`, of which it has the `share`, where the body stands at `body`.
+    pub fn between(&self, before: Option<&Pressed>, after: &Pressed, share: f32, body: &[Point3<f32>]) -> Pressed {
+        let before = before.unwrap_or(after);
+        let mix = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect();
+        Pressed {
+            floor: mix(&before.floor, &after.floor),
+            step: mix(&before.step, &after.step),
+            share: mix(&before.share, &after.share),
+            normals: vertex_normals(body, &self.triangles),
+        }
+    }
+
     /// How the columns are pressed where the body stands at `body`.
     pub fn press(&self, body: &[Point3<f32>]) -> Pressed {
         let normals = vertex_normals(body, &self.triangles);

@@ -32,7 +32,7 @@ pub struct Wearer<'a> {
     body: MovingSurface,
     /// The garments' sheets as lower layers of each other.
     surfaces: Vec<MovingSurface>,
-    /// How the columns are pressed where the last step ended; the unpressed skin is that of `skins`.
+    /// How the columns are pressed in the last pose.
     pressed: Option<Pressed>,
     /// Where the vertices of each garment were moved to beside where cloth and skin take them, in their local frames.
     corrections: Vec<Vec<Vector3<f32>>>,
@@ -74,11 +74,14 @@ impl<'a> Wearer<'a> {
     /// [`AnimationError::Motion`] where a layer cannot be moved.
     pub fn warm_up(&mut self, pose: &Pose, seconds: f64) -> Result<(), AnimationError> {
         if self.blend == Blend::Anchored {
-            let steps = self.steps(pose);
+            let (steps, pressed) = (self.steps(pose), self.pressed_at(pose)?);
+            let before = self.pressed.take();
             for k in 1..=steps {
-                let between = self.pose.interpolated(pose, k as f64 / steps as f64);
-                self.step(&between, seconds / steps as f64)?;
+                let share = k as f64 / steps as f64;
+                let between = self.pose.interpolated(pose, share);
+                self.step(&between, seconds / steps as f64, (before.as_ref(), &pressed, share as f32))?;
             }
+            self.pressed = Some(pressed);
         }
         self.pose = pose.clone();
         Ok(())
@@ -108,11 +111,11 @@ impl<'a> Wearer<'a> {
     fn finish(&mut self, seconds: f64) {
         let outfit = self.outfit;
         let skin = self.layers[0].clone();
-        let pressed = self.pressed.take().unwrap_or_else(|| outfit.columns.press(&skin));
+        let pressed = self.pressed.get_or_insert_with(|| outfit.columns.press(&skin));
         pressed.apply_to_body(&mut self.layers[0]);
         for (k, proxy) in outfit.proxies.iter().enumerate() {
             let fine = &mut self.layers[k + 1];
-            outfit.columns.apply(&pressed, &skin, k, fine);
+            outfit.columns.apply(pressed, &skin, k, fine);
             let moved: Vec<Vector3<f32>> =
                 self.sheets[k].positions.iter().zip(&self.carried[k]).map(|(x, c)| (x - c).cast::<f32>()).collect();
             proxy.ride.carry(&moved, fine);
@@ -158,14 +161,27 @@ impl<'a> Wearer<'a> {
         pose.transforms_from(&self.outfit.pose0, &self.outfit.skeleton)
     }
 
-    /// One step of the simulation.
-    fn step(&mut self, pose: &Pose, h: f64) -> Result<(), AnimationError> {
+    /// How the columns are pressed in a pose.
+    fn pressed_at(&mut self, pose: &Pose) -> Result<Pressed, AnimationError> {
+        let moved = self.moved(pose);
+        let posed = self.outfit.skinners[0].pose(&moved, self.way, &mut self.skins[0]);
+        posed.map_err(|e| AnimationError::Motion(e.to_string()))?;
+        Ok(self.outfit.columns.press(&self.skins[0].positions))
+    }
+
+    /// One step of the simulation, a `share` of the way from how the columns were pressed `before` to how they are pressed `after`.
+    fn step(
+        &mut self,
+        pose: &Pose,
+        h: f64,
+        (before, after, share): (Option<&Pressed>, &Pressed, f32),
+    ) -> Result<(), AnimationError> {
         let wrong = |e: &dyn std::fmt::Display| AnimationError::Motion(e.to_string());
         let outfit = self.outfit;
         let moved = self.moved(pose);
         outfit.skinners[0].pose(&moved, self.way, &mut self.skins[0]).map_err(|e| wrong(&e))?;
         let skin = &self.skins[0].positions;
-        let pressed = outfit.columns.press(skin);
+        let pressed = outfit.columns.between(before, after, share, skin);
         let mut body = skin.clone();
         pressed.apply_to_body(&mut body);
         self.body.move_to(&body);
@@ -206,7 +222,6 @@ impl<'a> Wearer<'a> {
             .collect();
         results.into_iter().collect::<Result<(), _>>().map_err(|e| wrong(&e))?;
         self.carried = targets;
-        self.pressed = Some(pressed);
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use toile_geometry::{
-    intersection::{crossings_among, segment_crosses},
+    intersection::{crossings, segment_crosses},
     open_surface::Against,
     triangle::ray_hit,
 };
@@ -69,17 +69,12 @@ pub(super) fn probe(
     (0.0, Some(Contact { upper, lower, by }))
 }
 
-/// Contacts wherever an edge of one layer passes through a triangle of the other, among `some` triangles of the upper
-/// layer; the upper has to move by `distance` metres along the lower one's normal.
-pub(super) fn crossing_contacts(
-    layers: &[Layer],
-    [upper, lower]: [usize; 2],
-    some: &[u32],
-    distance: f32,
-) -> Vec<Contact> {
+/// Contacts wherever an edge of one layer passes through a triangle of the other; the upper has to move by `distance` metres
+/// along the lower one's normal.
+pub(super) fn crossing_contacts(layers: &[Layer], [upper, lower]: [usize; 2], distance: f32) -> Vec<Contact> {
     let (over, under) = (&layers[upper].surface, &layers[lower].surface);
     let mut contacts = Vec::new();
-    for [t, u] in crossings_among(&over.mesh, some, &under.mesh, &under.bvh) {
+    for [t, u] in crossings(&over.mesh, &over.bvh, &under.mesh, &under.bvh) {
         let (x, y) = (over.mesh.corners(t as usize), under.mesh.corners(u as usize));
         let by = under.smooth_normal(u, [1.0 / 3.0; 3]) * distance;
         let lower = Anchor { layer: lower, corners: under.mesh.triangles[u as usize], weights: [1.0 / 3.0; 3] };

@@ -92,23 +92,9 @@ impl Contacts {
     pub fn crossings(&self, layers: &[Layer], gaps: f32) -> Vec<Contact> {
         let of_pair = |pair: &Pair| {
             let distance = gaps * layers[pair.upper].gap;
-            crossing_contacts(layers, [pair.upper, pair.lower], &pair.near(layers), distance)
+            crossing_contacts(layers, [pair.upper, pair.lower], distance)
         };
         self.pairs.iter().flat_map(of_pair).collect()
-    }
-}
-
-impl Pair {
-    /// Upper triangles that may cross the lower layer: one with all corners further from it than its longest side is
-    /// cannot.
-    fn near(&self, layers: &[Layer]) -> Vec<u32> {
-        let mesh = layers[self.upper].mesh();
-        let may = |t: &u32| {
-            let [a, b, c] = mesh.corners(*t as usize);
-            let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared()).sqrt();
-            mesh.triangles[*t as usize].iter().any(|&v| self.vertices[v as usize] < longest)
-        };
-        (0..mesh.triangles.len() as u32).filter(may).collect()
     }
 }
 

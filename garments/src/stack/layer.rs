@@ -21,6 +21,7 @@ impl Layer {
 
 /// Pairs of triangles of layer `upper` and of any layer below that cross, exactly.
 pub(super) fn crossing_pairs(layers: &[Layer], upper: usize) -> Vec<[u32; 2]> {
-    let mesh = layers[upper].mesh();
-    layers[..upper].iter().flat_map(|below| crossings(mesh, below.mesh(), &below.surface.bvh)).collect()
+    let surface = &layers[upper].surface;
+    let with = |below: &Layer| crossings(&surface.mesh, &surface.bvh, below.mesh(), &below.surface.bvh);
+    layers[..upper].iter().flat_map(with).collect()
 }

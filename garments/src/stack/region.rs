@@ -3,8 +3,6 @@
 use nalgebra::{Point3, Vector3};
 use toile_geometry::Mesh;
 
-/// Vertices this far from a place where layers come too near may move, metres.
-const MARGIN: f32 = 0.06;
 /// Vertices this much further stay, but count, metres.
 const HEEDED: f32 = 0.02;
 
@@ -17,9 +15,9 @@ pub(super) struct Region {
     pub high: Point3<f32>,
 }
 
-/// Boxes around all `places`, with a margin; those that met are one.
-pub(super) fn regions(places: impl Iterator<Item = Point3<f32>>) -> Vec<Region> {
-    let margin = Vector3::repeat(MARGIN);
+/// Boxes around all `places`, with a margin in which vertices may move, metres; those that met are one.
+pub(super) fn regions(places: impl Iterator<Item = Point3<f32>>, margin: f32) -> Vec<Region> {
+    let margin = Vector3::repeat(margin);
     let mut found: Vec<Region> = Vec::new();
     for p in places {
         let mut new = Region { low: p - margin, high: p + margin };
@@ -85,7 +83,7 @@ mod tests {
     fn places_near_one_another_share_a_region_in_any_order() {
         let places = [0.0, 0.5, 0.1, 0.6, 0.2].map(|x| Point3::new(x, 0.0, 0.0));
         for order in [[0, 1, 2, 3, 4], [4, 3, 2, 1, 0], [0, 4, 1, 3, 2]] {
-            let mut found = regions(order.into_iter().map(|i| places[i]));
+            let mut found = regions(order.into_iter().map(|i| places[i]), 0.06);
             found.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
             let ends: Vec<[f32; 2]> = found.iter().map(|r| [r.low.x, r.high.x]).collect();
             assert_eq!(ends, [[-0.06, 0.26], [0.44, 0.66]]);

@@ -72,7 +72,7 @@ pub fn posed_report(layers: &[Worn], skeleton: &Skeleton, pose0: &Pose, poses: &
 impl PosedReport {
     /// Adds a pose of layer `k`. Returns how many of its triangles poke through.
     fn add(&mut self, layers: &[Worn], posed: &[(Mesh, Bvh)], k: usize) -> usize {
-        let crossings = |l: usize| crossings(&posed[k].0, &posed[l].0, &posed[l].1);
+        let crossings = |l: usize| crossings(&posed[k].0, &posed[k].1, &posed[l].0, &posed[l].1);
         let all = (0..k).flat_map(|l| crossings(l).into_iter().map(move |pair| (l, pair)));
         let over = |(l, pair): &(usize, [u32; 2])| lies_over(layers[k].mesh, layers[*l].mesh, *pair);
         let (pairs, touching): (Vec<_>, Vec<_>) = all.partition(over);
