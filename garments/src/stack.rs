@@ -64,9 +64,12 @@ impl Care {
     }
 
     /// Vertices this far from a place where layers come too near may move, metres. From one frame to the next layers come into each
-    /// other by millimetres.
-    fn margin(self) -> f32 {
-        if self == Self::Frame { 0.025 } else { 0.06 }
+    /// other by millimetres: they are given more room only where that does not help.
+    fn margin(self, pass: usize) -> f32 {
+        match (self, pass) {
+            (Self::Frame, 0) => 0.025,
+            _ => 0.06,
+        }
     }
 }
 
@@ -162,7 +165,7 @@ fn settle(
             Care::Frame => contacts.crossings(layers, 1.0),
         };
         let places = left.iter().map(|c| place(layers, c)).chain(tangled(layers, &own));
-        let regions = regions(places, care.margin());
+        let regions = regions(places, care.margin(pass));
         if regions.is_empty() && (fresh || care == Care::Frame) {
             return (rounds, left);
         }
@@ -172,7 +175,8 @@ fn settle(
             continue;
         }
         fresh = false;
-        let solved: Vec<(Vec<Moved>, usize)> = regions.par_iter().map(|r| part(r, layers, settings)).collect();
+        let solved: Vec<(Vec<Moved>, usize)> =
+            regions.par_iter().map(|r| part(r, layers, settings, care == Care::Frame)).collect();
         rounds = solved.iter().map(|s| s.1).fold(rounds, usize::max);
         let still = solved.iter().all(|s| s.0.is_empty());
         let moved = apply(layers, solved, &regions, &mut contacts, settings);

@@ -18,7 +18,7 @@ const DRAG: f64 = 7.0;
 /// Deceleration by the cloth's own friction, m/s²: a twentieth of gravity, assumed.
 const DRY: f64 = 0.5;
 /// Time in which corrections fade, seconds: a step and a half of a walk.
-const FORGET: f64 = 1.5;
+const FORGET: f64 = 0.4;
 
 /// An outfit in motion: give it pose after pose.
 pub struct Wearer<'a> {

@@ -2,13 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-use toile_geometry::{Mesh, rims::grow};
+use toile_geometry::{Mesh, intersection::self_crossings, rims::grow};
 
 use super::{
     contact::Contact,
     contacts::Contacts,
     fair::fair,
-    layer::Layer,
+    layer::{Layer, crossing_pairs},
     patience::Patience,
     push::{Cloth, Push},
     region::Region,
@@ -34,9 +34,11 @@ const LOCAL_ROUNDS: f32 = 8.0;
 /// A vertex that moved, by layer and index, and where to.
 pub(super) type Moved = (usize, u32, Point3<f32>);
 
-/// Moves the layers apart in one region. Returns what moved, and the rounds it took.
-pub(super) fn part(region: &Region, layers: &[Layer], settings: &StackSettings) -> (Vec<Moved>, usize) {
+/// Moves the layers apart in one region. Returns what moved, and the rounds it took. In one `frame` of many, what did not end with
+/// fewer crossings moves nothing: the next frame would start from it.
+pub(super) fn part(region: &Region, layers: &[Layer], settings: &StackSettings, frame: bool) -> (Vec<Moved>, usize) {
     let mut pile = Pile::new(region, layers);
+    let before = if frame { pile.crossing() } else { usize::MAX };
     let mut contacts = Contacts::new(&pile.layers);
     let mut patience = Patience::default();
     let (mut fewest, mut best) = (usize::MAX, Vec::new());
@@ -74,8 +76,12 @@ pub(super) fn part(region: &Region, layers: &[Layer], settings: &StackSettings) 
         contacts.moved_in(&[Region::everywhere()], &moved, &pile.layers, settings.reach);
     }
     // What was nearest to being parted.
-    pile.layers.iter_mut().zip(best).for_each(|(layer, positions)| layer.surface.mesh.positions = positions);
-    (pile.moved(layers), settings.rounds)
+    for (layer, positions) in pile.layers.iter_mut().zip(best) {
+        layer.surface.mesh.positions = positions;
+        layer.surface.refresh();
+    }
+    let better = !frame || pile.crossing() < before;
+    (if better { pile.moved(layers) } else { Vec::new() }, settings.rounds)
 }
 
 /// Layers in a region while they are moved; layer 0 is the body.
@@ -107,6 +113,13 @@ impl Pile {
             all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + start)));
         }
         Self { cloth: Cloth::new(&all, held.concat()), layers, held, origins, starts }
+    }
+
+    /// Pairs of triangles that cross, of one layer or of two.
+    fn crossing(&self) -> usize {
+        let own = |layer: &Layer| self_crossings(layer.mesh(), &layer.surface.bvh).len();
+        let with_lower = |k: usize| crossing_pairs(&self.layers, k).len();
+        (1..self.layers.len()).map(|k| own(&self.layers[k]) + with_lower(k)).sum()
     }
 
     /// Vertices that lie elsewhere than in the `whole` layers.
