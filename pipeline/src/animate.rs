@@ -11,12 +11,13 @@ use std::{
 };
 
 use toile_animation::{
+    AnimationError,
     blend::{Blend, Outfit, OutfitLayer, Wearer},
     resample,
 };
 use toile_avatar::Avatar;
 use toile_capture::printable;
-use toile_character::{BodyModel, Motion};
+use toile_character::{BodyModel, Motion, Pose};
 use toile_cloth::Fabric;
 use toile_garments::{Apart, ExtractionReport, GarmentType};
 
@@ -36,8 +37,14 @@ use crate::{
 
 /// Expected seconds a frame of a garment.
 const SECONDS: f64 = 0.15;
-/// Seconds over which the layers come from the pose of the scan into the motion's first, and settle there.
-const WARM_UP: (f64, f64) = (1.0, 0.5);
+/// Seconds over which the layers come from the pose of the scan into the motion's first, seconds in which they settle there, and
+/// seconds a step: a tenth of the way.
+const WARM_UP: (f64, f64, f64) = (1.0, 0.5, 0.1);
+
+/// Layers are kept apart on the way from frame to frame each time that a joint has moved this far against the hips, metres, and at most
+/// so often: a walk at 30 frames a second moves a hand by 60 mm.
+const LONG_WAY: f64 = 0.12;
+const MOST_PARTS: f64 = 8.0;
 
 /// What was written.
 #[derive(Debug)]
@@ -146,27 +153,20 @@ fn bake(
     let layers = layers.map_err(|e| wrong(&e))?;
     let outfit = Outfit::new(avatar.skeleton.clone(), avatar.pose0.clone(), layers).map_err(|e| wrong(&e))?;
     let mut wearer = Wearer::new(&outfit, options.blend, options.skinning);
+    let mut apart = Apart::new(&avatar.layers.iter().map(|l| &l.mesh).collect::<Vec<_>>());
     let mut report = AnimationReport::new(motion, options, garments);
-    let first = &motion.poses[0];
     if options.blend != Blend::Skinning {
-        let steps = ((WARM_UP.0 + WARM_UP.1) / motion.frame_time).ceil();
-        for k in 1..=steps as usize {
-            let share = (k as f64 / (steps * WARM_UP.0 / (WARM_UP.0 + WARM_UP.1))).min(1.0);
-            wearer.warm_up(&avatar.pose0.interpolated(first, share), motion.frame_time).map_err(|e| wrong(&e))?;
-        }
+        warm_up(&mut wearer, &mut apart, &avatar.pose0, &motion.poses[0]).map_err(|e| wrong(&e))?;
     }
     let names: Vec<(&str, usize)> = avatar.layers.iter().map(|l| (l.name.as_str(), l.mesh.positions.len())).collect();
     let mut caches = Caches::begin(folder, &names, motion.poses.len())?;
-    let mut apart = Apart::new(&avatar.layers.iter().map(|l| &l.mesh).collect::<Vec<_>>());
     for (k, pose) in motion.poses.iter().enumerate() {
         let begun = Instant::now();
-        wearer.advance(pose, motion.frame_time).map_err(|e| wrong(&e))?;
-        let mut is_apart = false;
-        if options.blend != Blend::Skinning {
-            let mut layers = wearer.layers().to_vec();
-            is_apart = apart.keep(&mut layers) == 0;
-            wearer.correct(&layers).map_err(|e| wrong(&e))?;
-        }
+        let is_apart = match options.blend {
+            Blend::Skinning => wearer.advance(pose, motion.frame_time).map(|()| false),
+            _ => frame(&mut wearer, &mut apart, &motion.poses[k.saturating_sub(1)], pose, motion.frame_time),
+        };
+        let is_apart = is_apart.map_err(|e| wrong(&e))?;
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
         if options.blend == Blend::Skinning {
             apart.look(wearer.layers());
@@ -182,6 +182,38 @@ fn bake(
     let glb = playable::glb(avatar, motion, &mut written.open(&points)?, folder)?;
     written.finish(&glb, &report)?;
     Ok(report)
+}
+
+/// Moves the layers on to a pose and keeps them apart there, and on the way where that is long. True where none cross.
+fn frame(
+    wearer: &mut Wearer,
+    apart: &mut Apart,
+    from: &Pose,
+    pose: &Pose,
+    seconds: f64,
+) -> Result<bool, AnimationError> {
+    let parts = (wearer.way_to(pose) / LONG_WAY).ceil().clamp(1.0, MOST_PARTS) as usize;
+    let mut is_apart = false;
+    for k in 1..=parts {
+        wearer.advance(&from.interpolated(pose, k as f64 / parts as f64), seconds / parts as f64)?;
+        let mut layers = wearer.layers().to_vec();
+        is_apart = apart.keep(&mut layers) == 0;
+        wearer.correct(&layers)?;
+    }
+    Ok(is_apart)
+}
+
+/// Brings the layers from the pose of the scan into the `first` of a motion and lets them settle there.
+fn warm_up(wearer: &mut Wearer, apart: &mut Apart, scanned: &Pose, first: &Pose) -> Result<(), AnimationError> {
+    let steps = ((WARM_UP.0 + WARM_UP.1) / WARM_UP.2).ceil();
+    let mut before = scanned.clone();
+    for k in 1..=steps as usize {
+        let share = (k as f64 / (steps * WARM_UP.0 / (WARM_UP.0 + WARM_UP.1))).min(1.0);
+        let pose = scanned.interpolated(first, share);
+        frame(wearer, apart, &before, &pose, WARM_UP.2)?;
+        before = pose;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -149,6 +149,14 @@ impl<'a> Wearer<'a> {
         Ok(())
     }
 
+    /// Farthest that a joint moves against the hips from the last pose to this, metres.
+    pub fn way_to(&self, pose: &Pose) -> f64 {
+        let joints = |pose: &Pose| pose.joint_positions(&self.outfit.skeleton);
+        let (from, to) = (joints(&self.pose), joints(pose));
+        let hips = to[0] - from[0];
+        from.iter().zip(&to).map(|(a, b)| (b - a - hips).norm()).fold(0.0, f64::max)
+    }
+
     /// Steps that the simulation needs for the way from the last pose to this.
     fn steps(&self, pose: &Pose) -> usize {
         let (from, to) =
