@@ -2,6 +2,7 @@
 
 mod caches;
 mod options;
+mod pictures;
 mod playable;
 mod report;
 
@@ -21,7 +22,7 @@ use toile_character::{BodyModel, Motion, Pose};
 use toile_cloth::Fabric;
 use toile_garments::{Apart, ExtractionReport, GarmentType};
 
-use self::{caches::Caches, report::FrameReport};
+use self::{caches::Caches, pictures::Pictures, report::FrameReport};
 pub use self::{options::AnimateOptions, report::AnimationReport};
 use crate::{
     Goal, Observer, Options, PipelineError, Record, Run,
@@ -179,8 +180,10 @@ fn bake(
     report.sum_up();
     let written = caches.written()?;
     let points: Vec<usize> = names.iter().map(|n| n.1).collect();
-    let glb = playable::glb(avatar, motion, &mut written.open(&points)?, folder)?;
-    written.finish(&glb, &report)?;
+    let mut cached = written.open(&points)?;
+    let glb = playable::glb(avatar, motion, &mut cached, folder)?;
+    let pictures = Pictures { avatar, motion, cached: &mut cached, folder }.files(&report)?;
+    written.finish(&[("motion.glb", glb)].into_iter().chain(pictures).collect::<Vec<_>>(), &report)?;
     Ok(report)
 }
 

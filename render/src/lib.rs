@@ -4,7 +4,7 @@
 //! - [`shade`]: hemisphere and key light on sRGB albedo;
 //! - [`picture::picture`]: meshes fitted into a [`View`], coloured by their vertices, plain, as clay or by an attribute;
 //! - [`sheet::contact_sheet`], [`sheet::scale_bar`], [`label::draw`]: pictures side by side, legends, small text;
-//! - [`png::encode`]: the bytes of a PNG file.
+//! - [`png::encode`], [`film::gif`]: the bytes of a PNG file, of a moving picture.
 //!
 //! World: any right-handed frame with +Y up. Camera: +X right, +Y down, +Z forward, pixel centres at integers.
 //! Everything gives the same bytes for any number of threads.
@@ -25,6 +25,7 @@
 
 pub mod colormap;
 mod error;
+pub mod film;
 mod font;
 pub mod label;
 pub mod picture;

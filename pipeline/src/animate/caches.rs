@@ -77,14 +77,16 @@ impl Written {
         self.layers.iter().zip(points).map(open).collect()
     }
 
-    /// Puts the caches and `glb` in their place, and the report last.
-    pub fn finish(self, glb: &[u8], report: &AnimationReport) -> Result<(), PipelineError> {
+    /// Puts the caches and other `files` (name, bytes) in their place, and the report last.
+    pub fn finish(self, files: &[(&str, Vec<u8>)], report: &AnimationReport) -> Result<(), PipelineError> {
         let report_path = self.folder.join("report.json");
         remove(&report_path)?;
         for (part, whole) in self.layers {
             fs::rename(&part, &whole).map_err(|e| PipelineError::io(&part, e))?;
         }
-        atomic_write(&self.folder.join("motion.glb"), glb)?;
+        for (name, bytes) in files {
+            atomic_write(&self.folder.join(name), bytes)?;
+        }
         Ok(atomic_write(&report_path, &json::pretty(report)?)?)
     }
 }

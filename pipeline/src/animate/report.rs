@@ -73,6 +73,13 @@ impl AnimationReport {
         }
     }
 
+    /// The frame in which the layers stretch most; the first of equals.
+    pub(super) fn most_stretched(&self) -> usize {
+        let of = |f: &FrameReport| f.stretch_p99.iter().copied().fold(0.0, f32::max);
+        let first_of_equals = |a: &(usize, f32), b: &(usize, f32)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
+        self.frames.iter().map(of).enumerate().max_by(first_of_equals).map_or(0, |(frame, _)| frame)
+    }
+
     pub(super) fn sum_up(&mut self) {
         let mut times: Vec<f64> = self.frames.iter().map(|f| f.ms).collect();
         self.ms_a_frame = [0.5, 0.95].map(|q| quantile_by(&mut times, q, Rank::Count).unwrap_or(0.0));

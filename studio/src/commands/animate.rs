@@ -16,7 +16,8 @@ use crate::{
 
 const AFTER: &str = "\
 Writes SUBJECT/motion/NAME/: a point cache (PC2, metres, +Y up, vertices in the order of avatar.glb) for the body and each
-garment, motion.glb (the same motion for any player of glTF, by helper joints), and report.json. Blender shows the caches with the
+garment, motion.glb (the same motion for any player of glTF, by helper joints), film.gif and stills.png to look at, and
+report.json. Blender shows the caches with the
 modifier Mesh Cache on the meshes of avatar.glb.
 
 Cloth that lies on the body follows it, cloth that hangs swings, and layers that come through each other are moved apart;
