@@ -84,7 +84,7 @@ impl Flat {
 
     /// Lowest and highest row of cells in each column, turned, with `around` texels on each side; `cell` texels a cell.
     fn outline(&self, mesh: &Mesh, turn: u8, scale: f32, cell: f32, around: f32) -> Outline {
-        let size = if turn % 2 == 0 { self.size } else { [self.size[1], self.size[0]] };
+        let size = if turn.is_multiple_of(2) { self.size } else { [self.size[1], self.size[0]] };
         let columns = ((size[0] * scale + 2.0 * around) / cell).ceil() as usize + 1;
         let (mut low, mut high) = (vec![i32::MAX; columns], vec![i32::MIN; columns]);
         for &t in &self.triangles {
