@@ -17,6 +17,7 @@ pub(crate) enum Target {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Shape {
     Scalar = 1,
+    Vec2 = 2,
     Vec3 = 3,
     Vec4 = 4,
     Mat4 = 16,
@@ -26,6 +27,7 @@ impl Shape {
     fn name(self) -> &'static str {
         match self {
             Self::Scalar => "SCALAR",
+            Self::Vec2 => "VEC2",
             Self::Vec3 => "VEC3",
             Self::Vec4 => "VEC4",
             Self::Mat4 => "MAT4",
@@ -84,6 +86,15 @@ impl Buffer {
             "type": shape.name(),
         }));
         self.accessors.len() - 1
+    }
+
+    /// Adds a file, such as a picture; returns the view's index.
+    pub fn add_file(&mut self, bytes: &[u8]) -> usize {
+        let offset = self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        self.views.push(json!({ "buffer": 0, "byteOffset": offset, "byteLength": bytes.len() }));
+        self.views.len() - 1
     }
 
     /// Adds floats with their `min` and `max`, which glTF requires for positions and key times.

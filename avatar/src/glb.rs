@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use crate::{Avatar, AvatarError, buffer::Buffer, clip::clip, layer_mesh, rig::Rig};
 
 /// The program that wrote the file, for `asset.generator`.
-const GENERATOR: &str = concat!("Toile ", env!("CARGO_PKG_VERSION"));
+pub(crate) const GENERATOR: &str = concat!("Toile ", env!("CARGO_PKG_VERSION"));
 
 /// The avatar as a GLB file.
 ///

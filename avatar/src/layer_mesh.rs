@@ -69,12 +69,12 @@ pub(crate) fn extras(layer: &AvatarLayer) -> Value {
 }
 
 /// Unit length as the format demands; straight up where a vertex has no normal.
-fn unit(normal: &Vector3<f32>) -> [f32; 3] {
+pub(crate) fn unit(normal: &Vector3<f32>) -> [f32; 3] {
     let unit = normal.cast::<f64>().try_normalize(1e-12).unwrap_or_else(Vector3::y);
     unit.cast::<f32>().into()
 }
 
-fn indices(triangles: &[[u32; 3]], vertices: usize, buffer: &mut Buffer) -> usize {
+pub(crate) fn indices(triangles: &[[u32; 3]], vertices: usize, buffer: &mut Buffer) -> usize {
     // the largest u16 is reserved: it restarts a primitive
     if vertices < usize::from(u16::MAX) {
         let short: Vec<u16> = triangles.iter().flatten().map(|&i| i as u16).collect();

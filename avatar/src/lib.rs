@@ -3,6 +3,7 @@
 //! - [`Avatar`]: skeleton, the pose that the layers are in, layers with their skin weights, motions;
 //! - [`write_glb`]: one mesh node a layer, one skin, one animation a motion; with a single layer, a rigged scan;
 //! - [`write_glb_with_helpers`]: the same with joints beside the skeleton's, which show one motion of layers that swing;
+//! - [`write_textured`]: one mesh with a texture, without bones;
 //! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named.
 //!
 //! ```
@@ -43,6 +44,7 @@ mod layer_mesh;
 mod motion;
 mod point_cache;
 mod rig;
+mod textured;
 mod vrm;
 
 pub use dressed::{Avatar, AvatarLayer};
@@ -51,4 +53,5 @@ pub use glb::write_glb;
 pub use helpers::{HelperJoints, write_glb_with_helpers};
 pub use motion::{FileMotion, MotionJoint, read_motion};
 pub use point_cache::PointCache;
+pub use textured::{Picture, write_textured};
 pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, vrm_pose, write_vrm};

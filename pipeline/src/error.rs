@@ -11,6 +11,7 @@ use toile_fusion::FusionError;
 use toile_garments::GarmentError;
 use toile_geometry::GeometryError;
 use toile_render::RenderError;
+use toile_texture::TextureError;
 
 /// Errors of a run.
 #[derive(Debug, thiserror::Error)]
@@ -83,6 +84,8 @@ pub enum PipelineError {
 pub enum Cause {
     #[error(transparent)]
     Fusion(#[from] FusionError),
+    #[error(transparent)]
+    Texture(#[from] TextureError),
     #[error(transparent)]
     Fitting(#[from] FittingError),
     #[error(transparent)]

@@ -53,6 +53,16 @@ impl Folders {
         self.layer(layer).join("scan.ply")
     }
 
+    /// The scan of a take with its texture; there is none without colour pictures.
+    pub fn textured(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("textured.glb")
+    }
+
+    /// What of the texture was seen: 255 where a picture shows it, 128 where it was filled, 0 between charts.
+    pub fn texture_seen(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("texture-seen.png")
+    }
+
     /// Pose of the body in a take's scan.
     pub fn pose(&self, layer: &str) -> PathBuf {
         self.layer(layer).join("pose.json")

@@ -36,6 +36,8 @@ pub struct Options {
     pub last_layer: Option<String>,
     /// A file of settings beside the subject's own `toile.toml`.
     pub settings: Option<PathBuf>,
+    /// Largest edge of a texture for this run, texels; 0 makes none.
+    pub texture: Option<u32>,
     /// Settings of the fusion that were chosen for this run alone.
     pub fusion: FusionChoice,
     /// The first take shows the person dressed; it is kept in `edits/body.json`.

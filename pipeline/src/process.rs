@@ -16,6 +16,7 @@ use crate::{
     step::Step,
     steps::{
         cut::Cut, export::Export, fit::Fit, fuse::Fuse, page::Page, pose::PoseUnder, read_scan::ReadScan, stack::Stack,
+        texture::Texturing,
     },
     summary::{Measured, Summary, TakeSummary},
     take_order,
@@ -27,7 +28,9 @@ use crate::{
 /// [`PipelineError`] where a stage has no answer or a file cannot be read or written; what was done stays.
 pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observer) -> Result<Summary, PipelineError> {
     let settings = settings::read(Some(root), options.settings.as_deref())?;
-    let settings = Settings { fusion: options.fusion.over(&settings.fusion), ..settings };
+    let mut settings = Settings { fusion: options.fusion.over(&settings.fusion), ..settings };
+    settings.texture.size = options.texture.unwrap_or(settings.texture.size);
+    Texturing::check(root, &settings.texture)?;
     let mut run = Run::open(root, options.last_layer.as_deref(), settings, observer)?;
     if options.dressed && !run.is_first_dressed() {
         run.say_dressed()?;
@@ -64,11 +67,16 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
 fn to_scan(run: &Run, layer: &str, summary: &mut Summary) -> Result<TakeSummary, PipelineError> {
     let mut take = TakeSummary::of(layer);
     match ReadScan::of_layer(run, layer) {
-        None => take.fuse = Some(summary.hear(run.step(&Fuse::of_layer(run, layer))?)),
+        None => {
+            take.fuse = Some(summary.hear(run.step(&Fuse::of_layer(run, layer))?));
+            take.texture =
+                Texturing::of_layer(run, layer)?.map(|step| run.step(&step)).transpose()?.map(|r| summary.hear(r));
+        }
         Some(step) => {
             take.read = Some(summary.hear(run.step(&step)?));
             // Of a recording that the scan replaced.
             remove(&run.folders.trajectory(layer))?;
+            Texturing::remove(run, layer)?;
         }
     }
     Ok(take)
@@ -160,7 +168,7 @@ fn seconds(run: &Run, goal: Goal) -> f64 {
     let takes = run.layers.len() as f64;
     let garments = takes - run.first_garment() as f64;
     let costs = [
-        (Goal::Scans, takes * Fuse::SECONDS),
+        (Goal::Scans, takes * (Fuse::SECONDS + Texturing::SECONDS)),
         (Goal::Body, Fit::SECONDS),
         (Goal::Garments, garments * (PoseUnder::SECONDS + Cut::SECONDS + Stack::SECONDS)),
         (Goal::Avatar, Export::SECONDS),

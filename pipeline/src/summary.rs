@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 use toile_fitting::{FitReport, PartShown};
 use toile_fusion::FusionReport;
 use toile_garments::ExtractionReport;
+use toile_texture::TextureReport;
 
 use crate::{
     PipelineError, Record,
@@ -78,6 +79,8 @@ pub struct TakeSummary {
     pub fuse: Option<FusionReport>,
     /// How a finished scan was read; `None` where the take is a recording.
     pub read: Option<ScanReport>,
+    /// Its texture; `None` where the take has no colour pictures, or none was asked for.
+    pub texture: Option<TextureReport>,
     /// The body in it, where the take is dressed.
     pub pose: Option<PoseReport>,
     /// The garment.
@@ -87,7 +90,7 @@ pub struct TakeSummary {
 impl TakeSummary {
     /// Of a take of which nothing is decided yet.
     pub(crate) fn of(layer: &str) -> Self {
-        Self { layer: layer.to_string(), fuse: None, read: None, pose: None, cut: None }
+        Self { layer: layer.to_string(), fuse: None, read: None, texture: None, pose: None, cut: None }
     }
 }
 
@@ -111,6 +114,7 @@ impl Decided {
         for take in &self.takes {
             insert(&mut all, format!("{}/fuse", take.layer), take.fuse.as_ref())?;
             insert(&mut all, format!("{}/read", take.layer), take.read.as_ref())?;
+            insert(&mut all, format!("{}/texture", take.layer), take.texture.as_ref())?;
             insert(&mut all, format!("{}/pose", take.layer), take.pose.as_ref())?;
             insert(&mut all, format!("{}/cut", take.layer), take.cut.as_ref())?;
         }

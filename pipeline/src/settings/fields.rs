@@ -87,6 +87,26 @@ pub const FIELDS: &[Field] = &[
         [0.0, 3.0],
         "Height of the subject's highest point over what it stands on, as it stands there; the scan is scaled to it. 0: not known.",
     ),
+    number(
+        "texture.size",
+        "texels",
+        [0.0, 8192.0],
+        "Largest edge of a texture: 1024, 2048, 4096 or 8192; 0 makes none. Pictures that show less get a smaller one.",
+    ),
+    number(
+        "texture.padding",
+        "texels",
+        [1.0, 64.0],
+        "Empty texels around each chart at a size of 4096, for filtering and mip levels; in proportion at others.",
+    ),
+    number("texture.blended", "pictures", [1.0, 16.0], "At most this many pictures are blended at a place."),
+    number(
+        "texture.photos",
+        "pictures",
+        [1.0, 10000.0],
+        "At most this many pictures of a take are used, evenly spread.",
+    ),
+    switch("texture.even_light", "Take the light of the room out, so that the surface's own colours are left."),
     choice(
         "fit.method",
         &["toile", "seed"],

@@ -12,6 +12,7 @@ use toile_animation::RetargetSettings;
 use toile_fitting::{FitSettings, UnderSettings};
 use toile_fusion::FusionSettings;
 use toile_garments::{ExtractSettings, StackSettings};
+use toile_texture::TextureSettings;
 
 pub use print::print;
 pub use read::{FILE_NAME, read};
@@ -22,6 +23,8 @@ pub use read::{FILE_NAME, read};
 pub struct Settings {
     /// How takes are fused.
     pub fusion: FusionSettings,
+    /// How textures are made.
+    pub texture: TextureSettings,
     /// How the body is fitted to the undressed scan.
     pub fit: FitSettings,
     /// How the body is posed inside a dressed scan.

@@ -96,7 +96,7 @@ impl Step for Fuse<'_> {
 
 /// The files that make a recording: itself, or those of a folder that its layout reads. What a file is, is seen from its
 /// first bytes, before all of it is hashed.
-fn files_of(recording: &Path) -> Result<Vec<PathBuf>, PipelineError> {
+pub(super) fn files_of(recording: &Path) -> Result<Vec<PathBuf>, PipelineError> {
     if recording.is_dir() {
         return Ok(import::files(recording)?);
     }

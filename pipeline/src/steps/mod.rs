@@ -8,3 +8,4 @@ pub mod page;
 pub mod pose;
 pub mod read_scan;
 pub mod stack;
+pub mod texture;

@@ -14,6 +14,7 @@ use crate::{
         output::check_stage,
         prior::PriorChoice,
         reach::{is_subject, must_exist, reach},
+        texture_size::TextureSize,
     },
     outcome::Answer,
     session::Session,
@@ -52,6 +53,9 @@ pub struct Fuse {
     /// Truncation of the signed distances, millimetres (usually four voxels); noisy depth widens it
     #[arg(long, value_name = "MM")]
     truncation: Option<f64>,
+    /// Largest edge of the textures of a subject's scans (usually 4096, smaller where the pictures show less)
+    #[arg(long, value_enum, value_name = "SIZE")]
+    texture: Option<TextureSize>,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
@@ -87,8 +91,13 @@ impl Fuse {
             if self.poses.is_some() {
                 return Err(StudioError::Usage("--poses are those of one take; give its recording".into()));
             }
-            let options = Options { fusion, settings: self.settings.clone(), ..Options::default() };
+            let texture = self.texture.map(Into::into);
+            let options = Options { fusion, texture, settings: self.settings.clone(), ..Options::default() };
             return reach(&self.path, Goal::Scans, &options, session);
+        }
+        if self.texture.is_some() {
+            let reason = "--texture is for subjects; import the recording into one with `toile import`";
+            return Err(StudioError::Usage(reason.into()));
         }
         self.fuse_single(&fusion, session)
     }

@@ -23,3 +23,4 @@ mod reach;
 pub mod reorder;
 pub mod settings;
 pub mod synthesize;
+pub mod texture_size;

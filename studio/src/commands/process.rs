@@ -13,7 +13,7 @@ use toile_pipeline::{FusionChoice, Goal, Options, Summary, process as process_su
 
 use crate::{
     StudioError,
-    commands::{prior::PriorChoice, reach::motion_choice},
+    commands::{prior::PriorChoice, reach::motion_choice, texture_size::TextureSize},
     outcome::{Answer, error_document},
     session::Session,
 };
@@ -41,6 +41,9 @@ pub struct Process {
     /// turntable (usual): the person turns evenly before a resting camera; none: a camera held by hand
     #[arg(long, value_enum)]
     prior: Option<PriorChoice>,
+    /// Largest edge of the scans' textures (usually 4096, smaller where the pictures show less)
+    #[arg(long, value_enum, value_name = "SIZE")]
+    texture: Option<TextureSize>,
     /// The first take shows the person dressed: the body is estimated under the clothes, which become a layer (kept in edits/body.json)
     #[arg(long)]
     dressed: bool,
@@ -60,6 +63,7 @@ impl Process {
             fusion: FusionChoice { prior: self.prior.map(Into::into), ..FusionChoice::default() },
             settings: self.settings.clone(),
             dressed: self.dressed,
+            texture: self.texture.map(Into::into),
             ..Options::default()
         };
         process(&self.subjects, &options, session)

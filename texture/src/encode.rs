@@ -1,0 +1,39 @@
+//! Textures as files.
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png};
+use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+
+use crate::{Texture, TextureError};
+
+/// Quality of JPEG textures: the error of a texel is below the noise of the pictures.
+const QUALITY: u8 = 96;
+
+impl Texture {
+    /// The texture as a JPEG, colours at full resolution.
+    ///
+    /// # Errors
+    /// [`TextureError::Encode`].
+    pub fn to_jpeg(&self) -> Result<Vec<u8>, TextureError> {
+        let wrong = |error: jpeg_encoder::EncodingError| TextureError::Encode(error.to_string());
+        let mut bytes = Vec::new();
+        let mut encoder = Encoder::new(&mut bytes, QUALITY);
+        encoder.set_sampling_factor(SamplingFactor::R_4_4_4);
+        let size = u16::try_from(self.size).map_err(|_| TextureError::Encode("it is too large for a JPEG".into()))?;
+        encoder.encode(self.pixels.as_flattened(), size, size, ColorType::Rgb).map_err(wrong)?;
+        Ok(bytes)
+    }
+
+    /// What was seen, as a grey PNG: 255 seen, 128 filled, 0 between charts.
+    ///
+    /// # Errors
+    /// [`TextureError::Encode`].
+    pub fn seen_to_png(&self) -> Result<Vec<u8>, TextureError> {
+        let mut bytes = Vec::new();
+        let encoder =
+            png::PngEncoder::new_with_quality(&mut bytes, png::CompressionType::Fast, png::FilterType::NoFilter);
+        encoder
+            .write_image(&self.seen, self.size, self.size, ExtendedColorType::L8)
+            .map_err(|error| TextureError::Encode(error.to_string()))?;
+        Ok(bytes)
+    }
+}
