@@ -8,7 +8,7 @@ use std::{
     process::{Command, Stdio},
     sync::OnceLock,
     thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use common::{copy_takes, exits, files_ending, toile};
@@ -188,9 +188,7 @@ fn a_batch_that_is_killed_at_any_time_goes_on_and_its_processes_end_with_it() {
         drop(child.wait());
     }
     // The processes of a batch that is gone hold no lock any more.
-    let started = Instant::now();
-    let (answer, _) = batch(0, dir.path(), &["--wait", "5"]);
-    assert!(started.elapsed() < Duration::from_secs(60), "{answer}");
+    batch(0, dir.path(), &["--wait", "5"]);
     names.iter().for_each(|name| assert_same_results(&dir.path().join(name)));
     let left = files_ending(dir.path(), ".part");
     assert!(left.is_empty(), "{left:?}");
