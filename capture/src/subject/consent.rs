@@ -50,7 +50,11 @@ fn date<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> 
         Value::Datetime(date) => date.to_string(),
         other => other.to_string(),
     };
-    if is_date(&text) { Ok(Some(text)) } else { Err(D::Error::custom(format!("`{text}` is not a date such as 2027-05-31"))) }
+    if is_date(&text) {
+        Ok(Some(text))
+    } else {
+        Err(D::Error::custom(format!("`{text}` is not a date such as 2027-05-31")))
+    }
 }
 
 fn is_date(text: &str) -> bool {
