@@ -18,7 +18,7 @@ FIGURES = {
     "take_gb": 0.025,          # takes of that subject, as Kinect-like noise makes them
     "result_gb": 0.049,        # build/, avatar and page; point caches of motions come on top
     "files": 62,                # of which each is a request when it is fetched or written
-    "plan_ms": 1.0,             # planning a subject in a folder, processor time
+    "plan_ms": 0.17,            # planning a subject of one take in a folder, processor time
 }
 PRICES = {
     "core_hour": 0.02,          # a preemptible core with 4 GB
