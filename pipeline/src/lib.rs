@@ -9,11 +9,13 @@
 //! - [`Record`]: the content of `report.json` for a step; a step is skipped while its record holds;
 //! - [`Settings`]: of all stages, from `toile.toml`;
 //! - [`Run`]: one run over one subject; [`Folders`]: where its files lie;
+//! - [`plan()`]: what a run would have to do, from the [`Ticket`] that the last one left, without reading a take;
 //! - [`Observer`]: the receiver of a run's progress.
 //!
 //! A run can stop anywhere and go on later with the same result.
 
 mod animate;
+mod asked;
 mod avatar_choice;
 mod body_edits;
 mod body_file;
@@ -29,6 +31,7 @@ mod motion;
 mod observer;
 mod opened;
 mod options;
+mod plan;
 mod process;
 mod record;
 mod report;
@@ -43,15 +46,19 @@ mod step;
 pub mod steps;
 mod summary;
 mod take_order;
+mod ticket;
 
 pub use animate::{AnimateOptions, Animated, AnimationReport, animate};
+pub use asked::Asked;
 pub use body_edits::BodyEdits;
 pub use error::{Cause, PipelineError};
 pub use folders::Folders;
+pub use hash::{bytes as hash_bytes, file as hash_file};
 pub use meshes::read_mesh;
 pub use observer::{Observer, Silent};
 pub use opened::Opened;
 pub use options::{FusionChoice, Goal, HiddenChoice, MotionChoice, Options};
+pub use plan::{Plan, Standing, plan};
 pub use process::process;
 pub use record::{Record, steps_in};
 pub use resume::run_step;
@@ -60,4 +67,5 @@ pub use scan_survey::ScanSurvey;
 pub use settings::Settings;
 pub use step::{Product, Remarks, Step};
 pub use summary::{Decided, Measured, Summary, TakeSummary};
+pub use ticket::Ticket;
 pub use toile_animation::blend::Blend;

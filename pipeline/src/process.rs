@@ -20,6 +20,7 @@ use crate::{
     },
     summary::{Measured, Summary, TakeSummary},
     take_order,
+    ticket::Ticket,
 };
 
 /// Takes the subject at `root` to `goal`, doing whatever is missing.
@@ -60,6 +61,9 @@ pub fn process(root: &Path, goal: Goal, options: &Options, observer: &dyn Observ
     }
     summary.notes.extend(stale::note(&run.folders, goal));
     summary.notes.extend(run.remarks());
+    if goal == Goal::Report && options.last_layer.is_none() {
+        Ticket::write(&run)?;
+    }
     Ok(summary)
 }
 

@@ -1,7 +1,7 @@
 //! `report.json`: what the steps that worked in a folder decided.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
@@ -75,6 +75,16 @@ pub fn steps_in(folder: &Path) -> Vec<String> {
     let stages = read_file(&report_path(folder)).unwrap_or_default().stages;
     let is_whole = |stage: &Sealed| stage.seal.as_ref().is_some_and(|seal| seal_of(&stage.record) == *seal);
     stages.into_iter().filter(|(_, stage)| is_whole(stage)).map(|(step, _)| step).collect()
+}
+
+/// The files that the steps in `folder` read and wrote, by step; paths as in the records. A file that cannot be read gives none.
+pub(crate) fn files_in(folder: &Path) -> BTreeMap<String, BTreeSet<String>> {
+    let names = |record: &Value, key: &str| -> Vec<String> {
+        record.get(key).and_then(Value::as_object).map_or_else(Vec::new, |map| map.keys().cloned().collect())
+    };
+    let stages = read_file(&report_path(folder)).unwrap_or_default().stages;
+    let files = |record: &Value| names(record, "inputs").into_iter().chain(names(record, "outputs")).collect();
+    stages.into_iter().map(|(step, sealed)| (step, files(&sealed.record))).collect()
 }
 
 /// Puts the record of `step` into the file of `folder`, beside those of other steps.

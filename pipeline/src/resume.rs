@@ -16,9 +16,9 @@ use crate::{
 };
 
 /// How long each step of a folder took.
-const TIMINGS: &str = "timings.json";
+pub(crate) const TIMINGS: &str = "timings.json";
 /// Part of every record's hash: a new program version builds again.
-const PROGRAM: &str = concat!("toile ", env!("CARGO_PKG_VERSION"));
+pub(crate) const PROGRAM: &str = concat!("toile ", env!("CARGO_PKG_VERSION"));
 
 /// The record of an earlier run with the same hash whose outputs are still what it wrote; else the work is done, its
 /// files and the record are written, and that is given. Paths in the record are relative to `root`.
@@ -94,7 +94,7 @@ fn varied(folder: &Path, step: &str) -> Option<BTreeMap<String, String>> {
 }
 
 /// Times that cannot be read are of no use to anybody: they start anew.
-fn read_timings(folder: &Path) -> BTreeMap<String, Value> {
+pub(crate) fn read_timings(folder: &Path) -> BTreeMap<String, Value> {
     json::read(&folder.join(TIMINGS)).unwrap_or_default()
 }
 

@@ -43,6 +43,11 @@ impl<'a> Run<'a> {
         observer: &'a dyn Observer,
     ) -> Result<Self, PipelineError> {
         let subject = LockedSubject::open(root)?;
+        if let Some(why) = subject.withheld() {
+            let reason =
+                format!("{why} (subject.toml), so that it is not processed; `toile archive forget` removes the person");
+            return Err(PipelineError::refused(root, reason));
+        }
         let garment_types = garment_types(root, subject.layers())?;
         let mut layers: Vec<String> = subject.layers().iter().map(Layer::label).collect();
         if layers.is_empty() {

@@ -58,6 +58,12 @@ pub enum Command {
     Animate(commands::animate::Animate),
     /// Everything from recorded takes to avatar and report: runs whatever is missing
     Process(commands::process::Process),
+    /// Process a whole archive: what is stale, side by side
+    Batch(commands::batch::Batch),
+    /// Ask an archive: subjects, verdicts, measures, warnings, times
+    Catalog(commands::catalog::Catalog),
+    /// Keep an archive: check it, move it, remove a person from it
+    Archive(commands::archive::Archive),
     /// The whole way on the recorded session that ships with Toile
     Demo(commands::demo::Demo),
     /// Show the settings of all stages, with units, ranges and defaults

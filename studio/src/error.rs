@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use toile_archive::ArchiveError;
 use toile_capture::CaptureError;
 use toile_character::CharacterError;
 use toile_live::LiveError;
@@ -19,6 +20,9 @@ pub enum StudioError {
     /// A device, its settings, or the permission to use it.
     #[error(transparent)]
     Live(LiveError),
+    /// From an archive.
+    #[error(transparent)]
+    Archive(ArchiveError),
     /// From a stage or its files.
     #[error(transparent)]
     Pipeline(PipelineError),
@@ -46,6 +50,7 @@ impl StudioError {
             Self::Usage(_) => "usage",
             Self::Signal(_) => "device",
             Self::Live(error) => error.kind(),
+            Self::Archive(_) => "archive",
             Self::Pipeline(error) => error.kind(),
         }
     }
@@ -55,7 +60,8 @@ impl StudioError {
         match self {
             Self::Pipeline(error) => error.file(),
             Self::Live(error) => error.file(),
-            Self::Usage(_) | Self::Signal(_) => None,
+            Self::Archive(ArchiveError::Refused { path, .. } | ArchiveError::Catalog { path, .. }) => Some(path),
+            Self::Usage(_) | Self::Signal(_) | Self::Archive(_) => None,
         }
     }
 
@@ -63,7 +69,7 @@ impl StudioError {
     pub fn field(&self) -> Option<&str> {
         match self {
             Self::Pipeline(error) => error.field_name(),
-            Self::Usage(_) | Self::Signal(_) | Self::Live(_) => None,
+            Self::Usage(_) | Self::Signal(_) | Self::Live(_) | Self::Archive(_) => None,
         }
     }
 }
@@ -73,6 +79,15 @@ impl From<PipelineError> for StudioError {
         match error {
             PipelineError::NoLayer { .. } => Self::Usage(error.to_string()),
             other => Self::Pipeline(other),
+        }
+    }
+}
+
+impl From<ArchiveError> for StudioError {
+    fn from(error: ArchiveError) -> Self {
+        match error {
+            ArchiveError::Pipeline(error) => error.into(),
+            other => Self::Archive(other),
         }
     }
 }

@@ -64,6 +64,9 @@ impl Command {
             Self::Export(c) => c.run(session),
             Self::Animate(c) => c.run(session),
             Self::Process(c) => c.run(session),
+            Self::Batch(c) => c.run(session),
+            Self::Catalog(c) => c.run(session),
+            Self::Archive(c) => c.run(session),
             Self::Demo(c) => c.run(session),
             Self::Settings(c) => c.run(session),
             Self::Synthesize(c) => c.run(session),
@@ -87,6 +90,9 @@ impl Command {
             Self::Export(_) => "export",
             Self::Animate(_) => "animate",
             Self::Process(_) => "process",
+            Self::Batch(_) => "batch",
+            Self::Catalog(_) => "catalog",
+            Self::Archive(_) => "archive",
             Self::Demo(_) => "demo",
             Self::Settings(_) => "settings",
             Self::Synthesize(_) => "synthesize",
@@ -143,7 +149,8 @@ fn start_log(session: &Session) {
 
 fn print(command: &str, answer: &Result<Answer, StudioError>, globals: &Globals) {
     if globals.json {
-        return say(&document(command, answer));
+        // After lines of events comes one line more.
+        return if command == "batch" { say_line(&document(command, answer)) } else { say(&document(command, answer)) };
     }
     match answer {
         // Names of files and sensors come from outside: nothing in them may steer the terminal.
@@ -166,6 +173,12 @@ fn say(document: &serde_json::Value) {
     let bytes = json::pretty(document).unwrap_or_default();
     // A reader that went away is not a failure of ours.
     drop(io::stdout().write_all(&bytes));
+}
+
+/// A document on one line of standard output.
+pub(crate) fn say_line(document: &serde_json::Value) {
+    let mut out = io::stdout().lock();
+    drop(writeln!(out, "{document}").and_then(|()| out.flush()));
 }
 
 /// Log lines that do not tear the progress bar.

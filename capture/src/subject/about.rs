@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     comments::keep_comments,
+    consent::Consent,
     layer::{Layer, check_name},
 };
 use crate::{
@@ -23,6 +24,9 @@ pub(super) struct About {
     pub(super) rig: String,
     #[serde(default)]
     pub(super) notes: String,
+    /// Whether and until when the subject may be processed and kept.
+    #[serde(flatten)]
+    pub(super) consent: Consent,
     /// Fields that mean nothing to this program; they are kept.
     #[serde(flatten)]
     pub(super) unknown: toml::Table,

@@ -17,6 +17,7 @@
 
 mod about;
 mod comments;
+mod consent;
 mod date;
 mod layer;
 mod lock;
@@ -27,6 +28,7 @@ mod reorder;
 mod reorder_plan;
 mod scan_take;
 
+pub use date::today;
 pub use layer::{BODY, Layer};
 pub use lock::SubjectLock;
 pub use locked::LockedSubject;

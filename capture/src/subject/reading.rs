@@ -7,6 +7,7 @@ use std::{
 
 use super::{
     about::{self, About},
+    date::today,
     layer::{BODY, Layer, check_name},
     pending::Note,
     reorder_plan::is_reordering,
@@ -98,6 +99,17 @@ impl Subject {
     /// `build/NN-name/`.
     pub fn build_folder(&self, layer: &Layer) -> PathBuf {
         self.build_path().join(layer.label())
+    }
+
+    /// Why the subject may not be processed today, as `consent`, `consent_until` and `retain_until` of `subject.toml` say;
+    /// `None` where it may.
+    pub fn withheld(&self) -> Option<String> {
+        self.about.consent.withheld(&today())
+    }
+
+    /// Until when the subject was to be kept, where that day is over.
+    pub fn overdue(&self) -> Option<String> {
+        self.about.consent.overdue(&today())
     }
 
     /// What the operator should know of the folder itself, a sentence each: fields of `subject.toml` that mean nothing,

@@ -9,3 +9,33 @@ pub mod pose;
 pub mod read_scan;
 pub mod stack;
 pub mod texture;
+
+use crate::step::Step;
+
+/// Facts about a step that planning needs.
+#[derive(Debug, Clone, Copy)]
+pub struct StepFacts {
+    /// Its name in `report.json`.
+    pub name: &'static str,
+    /// Its version.
+    pub version: u32,
+    /// Expected seconds of one run.
+    pub seconds: f64,
+}
+
+const fn facts<S: Step>() -> StepFacts {
+    StepFacts { name: S::NAME, version: S::VERSION, seconds: S::SECONDS }
+}
+
+/// All steps of a run in the order in which they work: what a step makes stale comes after it.
+pub const STEPS: &[StepFacts] = &[
+    facts::<read_scan::ReadScan>(),
+    facts::<fuse::Fuse>(),
+    facts::<texture::Texturing>(),
+    facts::<fit::Fit>(),
+    facts::<pose::PoseUnder>(),
+    facts::<cut::Cut>(),
+    facts::<stack::Stack>(),
+    facts::<export::Export>(),
+    facts::<page::Page>(),
+];

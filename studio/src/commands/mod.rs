@@ -1,9 +1,13 @@
 //! The commands, a file each: its options, its calls, its answer.
 
 pub mod animate;
+pub mod archive;
+pub mod batch;
+mod batch_report;
 pub mod calibrate;
 mod calibrate_board;
 pub mod capture;
+pub mod catalog;
 pub mod completions;
 pub mod demo;
 pub mod devices;

@@ -7,6 +7,7 @@ use std::{
     time::Instant,
 };
 
+use rustix::process::{Pid, Signal, getpid, getppid, kill_process, set_parent_process_death_signal};
 use serde_json::{Value, json};
 use toile_capture::printable_path;
 use toile_pipeline::{FusionChoice, Goal, Options, Summary, process as process_subject};
@@ -50,6 +51,9 @@ pub struct Process {
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    /// End when the process that started this one ends, however it does (a batch gives its own number)
+    #[arg(long, hide = true, value_name = "PROCESS")]
+    with_parent: Option<i32>,
 }
 
 impl Process {
@@ -58,6 +62,9 @@ impl Process {
     /// # Errors
     /// [`StudioError`] where the motion cannot be read; a subject that fails is named in the answer.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        if let Some(parent) = self.with_parent {
+            end_with(parent);
+        }
         let options = Options {
             motion: motion_choice(self.motion.as_deref()),
             fusion: FusionChoice { prior: self.prior.map(Into::into), ..FusionChoice::default() },
@@ -67,6 +74,16 @@ impl Process {
             ..Options::default()
         };
         process(&self.subjects, &options, session)
+    }
+}
+
+/// Has the system end this process when its parent does, so that nobody works on for a batch that is gone.
+fn end_with(parent: i32) {
+    // Where the system cannot, the process ends when its subject is done.
+    let _ = set_parent_process_death_signal(Some(Signal::KILL));
+    if Pid::as_raw(getppid()) != parent {
+        // It ended before it could be watched.
+        let _ = kill_process(getpid(), Signal::KILL);
     }
 }
 

@@ -78,6 +78,7 @@ const TABLE: &[Row] = &[
         ],
         &["synthetic", "driver-synthetic"],
     ),
+    row("archive", &["geometry", "capture", "render", "pipeline"], &["outside"]),
     // The program and the end-to-end tests bring everything together.
     row("studio", ALL, ALL),
     row("outside", &[], &[]),
@@ -99,6 +100,7 @@ const ONLY: &[(&str, &[&str])] = &[
     ("nokhwa", &["driver-webcam"]),
     ("mcap", &["capture"]),
     ("gltf-json", &["avatar"]),
+    ("rusqlite", &["archive"]),
 ];
 
 /// Words that must not stand in a crate's source: crate, words, and which promise of ARCHITECTURE.md that keeps.
@@ -130,6 +132,7 @@ const NEVER: &[(&str, &[&str], &str)] = &[
     ),
     ("studio", &["rasterize", "Bvh::new", "nalgebra::DMatrix", "faer::"], "does not hold algorithms"),
     ("pipeline", &["println!", "eprintln!", "std::io::stdout", "std::process::exit"], "talks to no terminal"),
+    ("archive", &["println!", "eprintln!", "std::io::stdout", "std::process::exit"], "talks to no terminal"),
     ("live", &["println!", "eprintln!", "std::io::stdout", "std::process::exit"], "talks to no terminal"),
 ];
 

@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Batches on what others make: a Ray cluster of two nodes in this box, whose worker, driver and node are killed. It has two minutes at
+# most. Prints RAY PASS, or SKIPPED and why: a machine that cannot reach PyPI is no fault.
+set -uo pipefail
+cd "$(dirname "$0")/../.."
+python=$PWD/target/outside/batch/bin/python
+limit=${BATCH_SECONDS:-120}
+status=0
+
+trial() { # name, module, script
+    local log=target/outside/batch-$1.log seconds=$SECONDS
+    if ! "$python" -c "import $2" 2>/dev/null; then
+        echo "$1 SKIPPED: the package $2 could not be installed (target/outside/batch.log)"
+        return
+    fi
+    (cd tests/batch && timeout --kill-after=10 "$limit" "$python" "$3") >"$log" 2>&1
+    case $? in
+        0) echo "$1 PASS in $((SECONDS - seconds)) s: $(tail -n 1 "$log")" ;;
+        124 | 137) echo "$1 SKIPPED: it did not end within $limit s on this machine ($log)" ;;
+        *) tail -n 20 "$log" >&2; echo "$1 FAILED ($log)"; status=1 ;;
+    esac
+}
+
+trial RAY ray ray_cluster.py
+exit "$status"
