@@ -45,6 +45,8 @@ export class Viewer {
     this.controls.maxDistance = 15;
     this.look("front");
     this.watch();
+    // For tests in a browser and the developer's console.
+    Object.assign(canvas, { viewer: this });
   }
 
   private watch(): void {
@@ -164,6 +166,13 @@ export class Viewer {
     caster.firstHitOnly = true;
     caster.setFromCamera(this.pointer(clientX, clientY), this.camera);
     return caster.intersectObjects(objects, false)[0] ?? null;
+  }
+
+  /** Where in the window a point is drawn. */
+  windowPlace(point: readonly [number, number, number]): [number, number] {
+    const at = new Vector3(...point).project(this.camera);
+    const box = this.canvas.getBoundingClientRect();
+    return [box.left + (box.width * (1 + at.x)) / 2, box.top + (box.height * (1 - at.y)) / 2];
   }
 
   private pointer(clientX: number, clientY: number): Vector2 {
