@@ -28,6 +28,7 @@ demo: build ## Process the shipped recording to an avatar and say where to look
 test: demo ## The demo, then all tests, with the outside checkers that can be installed here
 	@bash scripts/outside.sh
 	@bash scripts/console.sh test
+	@bash scripts/console.sh e2e
 	bash scripts/cargo.sh test --release --locked --workspace
 	bash scripts/cargo.sh test --release --locked -p toile-driver-kinect2 --test endurance -- --ignored
 	@bash tests/readme.sh

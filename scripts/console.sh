@@ -3,6 +3,7 @@
 # Where Node or the npm registry is missing, the program is built all the same; its page then says how to build the console.
 #   console.sh          installs Node where it is missing (Debian), the packages of package-lock.json, and builds
 #   console.sh test     runs the console's unit tests and checks its weight
+#   console.sh e2e      drives the built program in Debian's Chromium, which is installed where it is missing
 set -uo pipefail
 cd "$(dirname "$0")/../console"
 needed=18
@@ -16,15 +17,21 @@ node_version() { node --version 2>/dev/null | sed -n 's/^v\([0-9]*\)\..*/\1/p'; 
 
 has_node() { [ "$(node_version)" != "" ] && [ "$(node_version)" -ge "$needed" ] && command -v npm >/dev/null; }
 
-install_node() {
+debian() { # installs Debian packages, where there is apt-get
     command -v apt-get >/dev/null || return 1
     local as_root=()
     if [ "$(id -u)" -ne 0 ]; then
         command -v sudo >/dev/null || return 1
         as_root=(sudo)
     fi
-    echo "console: installing Node"
-    "${as_root[@]}" apt-get update -q && "${as_root[@]}" apt-get install -y -q --no-install-recommends nodejs npm
+    echo "console: installing $*"
+    "${as_root[@]}" apt-get update -q && "${as_root[@]}" apt-get install -y -q --no-install-recommends "$@"
+}
+
+missing_browser() {
+    echo "console: Chromium is missing and could not be installed; the tests in the browser are left out"
+    [ "${TOILE_REQUIRE_OUTSIDE:-}" != 1 ]
+    exit
 }
 
 # What is installed and what is built goes with the files that it was made of.
@@ -40,11 +47,16 @@ install_packages() {
 
 sources() { find src public index.html package-lock.json vite.config.ts tsconfig.json -type f | LC_ALL=C sort; }
 
-has_node || install_node || true
+has_node || debian nodejs npm || true
 has_node || without "Node $needed or later and npm are missing and could not be installed"
 install_packages || without "its packages could not be installed (npm ci failed)"
 if [ "${1:-}" = test ]; then
     npm test --silent && npm run check --silent
+    exit
+fi
+if [ "${1:-}" = e2e ]; then
+    command -v chromium >/dev/null || debian chromium || missing_browser
+    npm run e2e --silent
     exit
 fi
 sum=$(sources | xargs cat | sha256sum | cut -d' ' -f1)

@@ -12,4 +12,6 @@ import "./styles/jobs.css";
 
 applyTheme();
 keepListening();
-render(<App />, document.getElementById("app")!);
+const root = document.getElementById("app")!;
+root.replaceChildren();
+render(<App />, root);

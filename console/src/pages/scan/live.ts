@@ -9,6 +9,8 @@ export interface PictureHeader {
   height: number;
   seq: number;
   age_ms: number;
+  /** When its frame arrived, Unix milliseconds by the service's clock. */
+  unix_ms?: number;
   fps: number;
   guidance: Guidance | null;
 }

@@ -28,6 +28,9 @@ export function ScanPage({ subject: asked }: { subject: string | null }) {
   const live = useLive(capture !== null && LIVE_STATES.includes(capture.state), ["cutout", "depth", "surface"]);
   const headline = headlineOf(capture, live.guidance, session.counting !== null, session.next?.say ?? "");
   useFollow(capture, asked);
+  useEffect(() => {
+    if (capture?.state === "preview") live.clearSurface();
+  }, [capture?.state]);
   useCues(capture, headline, session.counting !== null);
   useActionKey(session.run);
   if (capture === null) return <p class="page dim" role="status">Asking the service …</p>;
