@@ -48,6 +48,20 @@ describe("the brush", () => {
     expect(region.size).toBeLessThanOrEqual(round.length);
   });
 
+  it("goes round a fold, however near its other side is", () => {
+    const { positions, triangles } = sheets([0]);
+    // Folded over at the middle column: the halves lie 4 mm apart.
+    const folded = positions.map((value, k) => {
+      const i = Math.floor(k / 3) % SIDE;
+      if (k % 3 === 0) return Math.min(i, SIDE - 1 - i) * STEP;
+      return k % 3 === 2 && i > SIDE / 2 ? 0.004 : value;
+    });
+    const graph = new ScanGraph(folded, triangles);
+    const start = 20 * SIDE + 16;
+    const region = graph.within([0.08, 0.1, 0], [start], 0.03);
+    expect(Math.max(...[...region.keys()].map((v) => v % SIDE))).toBeLessThanOrEqual(22);
+  });
+
   it("is one stroke in the file where the ball touches nothing else", () => {
     const graph = graphOf([0]);
     const stroke: Stroke = { mark: "belongs", points: [CENTER, [0.12, 0.1, 0]], radius: 0.03 };

@@ -97,6 +97,7 @@ describe("claps", () => {
 
   it("are not speech, and not a noise that stays", () => {
     expect(heard([...quiet, ...Array.from({ length: 60 }, (_, k): [number, number] => [0.4 + 0.1 * Math.sin(k), 1.5 + k * 0.015]), [0.01, 2.5]])).toBe(0);
+    expect(heard([...quiet, ...Array.from({ length: 20 }, (_, k): [number, number] => [0.5, 1.5 + k * 0.015]), [0.01, 1.81]])).toBe(0);
     expect(heard([...quiet, [0.15, 1.52], [0.02, 1.535]])).toBe(0);
   });
 });
