@@ -1,5 +1,5 @@
 import type {
-  Archive, BodyEdits, Capture, DeviceList, Job, JobKind, LayerEdits, MotionClip, NextLayer, Subject, SubjectLine,
+  Archive, Binned, BodyEdits, Capture, DeviceList, Job, JobKind, LayerEdits, MotionClip, NextLayer, Subject, SubjectLine,
 } from "./types";
 import { setLink } from "./link";
 
@@ -76,6 +76,7 @@ export const api = {
   archive: () => get<Archive>("api/archive"),
   addSubject: (id: string, name: string) => send<SubjectLine>("POST", "api/subjects", { id, name }),
   removeSubject: (id: string) => send<{ undo: string }>("DELETE", one(id)),
+  bin: () => get<Binned[]>("api/bin"),
   restore: (undo: string) => send<void>("POST", `api/bin/${encodeURIComponent(undo)}/restore`),
   subject: (id: string) => get<Subject>(one(id)),
   next: (id: string) => get<NextLayer>(`${one(id)}/next`),

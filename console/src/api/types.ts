@@ -20,6 +20,14 @@ export interface SubjectLine {
   problem: string | null;
 }
 
+/** A subject that was taken out of the archive. */
+export interface Binned {
+  undo: string;
+  id: string;
+  name: string;
+  removed: number;
+}
+
 export interface Archive {
   name: string;
   path: string;

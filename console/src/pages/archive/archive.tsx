@@ -8,6 +8,7 @@ import { Icon } from "../../ui/icons";
 import { tell, tellError } from "../../ui/toasts";
 import { VirtualList } from "../../ui/virtual";
 import { countText, momentText, SUBJECT_STATES } from "../../ui/words";
+import { BinDialog } from "./bin";
 import { NewSubject } from "./new_subject";
 import { found, sorted, type SortKey } from "./order";
 
@@ -44,6 +45,7 @@ export function ArchivePage() {
   const key = (query.get("sort") ?? "modified") as SortKey;
   const reversed = query.get("reversed") === "1";
   const [adding, setAdding] = useState(false);
+  const [binOpen, setBinOpen] = useState(false);
   const all = archive?.subjects ?? [];
   const shown = useMemo(() => sorted(found(all, search), key, reversed), [all, search, key, reversed]);
   const remove = (subject: SubjectLine) => void removed(subject, read);
@@ -67,6 +69,7 @@ export function ArchivePage() {
         <button type="button" class="plain" aria-pressed={reversed} onClick={() => refine({ reversed: reversed ? null : "1" })}>
           Reversed
         </button>
+        <button type="button" class="plain" onClick={() => setBinOpen(true)}><Icon name="bin" />Bin</button>
         <button type="button" class="main" onClick={() => setAdding(true)}><Icon name="plus" />New subject</button>
       </div>
       {error !== null && <p class="bad pad" role="alert">{error}</p>}
@@ -74,6 +77,7 @@ export function ArchivePage() {
       {archive !== null && all.length > 0 && shown.length === 0 && <p class="pad dim">No subject matches “{search}”.</p>}
       <VirtualList label="Subjects" count={shown.length} rowHeight={ROW} keyOf={(k) => shown[k].id}
         row={(k) => <SubjectRow subject={shown[k]} onRemove={remove} />} />
+      {binOpen && <BinDialog onRestored={() => void read()} onClose={() => setBinOpen(false)} />}
       {adding && <NewSubject taken={all.map((s) => s.id)} onClose={() => setAdding(false)} />}
     </div>
   );

@@ -5,7 +5,7 @@ import { go, placeText } from "../../router";
 import { isOpen, jobs } from "../../state/jobs";
 import { useStore } from "../../state/store";
 import { tellError } from "../../ui/toasts";
-import { JOB_KINDS, JOB_STATES, momentText, timeText } from "../../ui/words";
+import { countText, JOB_KINDS, JOB_STATES, momentText, timeText } from "../../ui/words";
 
 export function JobsPage({ id }: { id: number | null }) {
   const all = useStore(jobs);
@@ -47,6 +47,7 @@ function JobRow({ job, chosen }: { job: Job; chosen: boolean }) {
       </div>
       {job.state === "running" && <JobProgress job={job} />}
       {job.error !== null && <p class="bad">{job.error}</p>}
+      {job.state === "done" && job.warnings > 0 && <p><a href={placeText(["subjects", job.subject], { view: "notices" })}>{countText(job.warnings, "warning")}</a></p>}
       <div class="job-foot">
         <span class="dim">{footText(job)}</span>
         <JobActions job={job} chosen={chosen} />

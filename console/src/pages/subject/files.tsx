@@ -2,6 +2,7 @@ import { fileAddress } from "../../api/client";
 import type { Subject } from "../../api/types";
 import { Icon } from "../../ui/icons";
 import { bytesText } from "../../ui/words";
+import { ExportForm } from "./export";
 
 export function FilesPanel({ subject }: { subject: Subject }) {
   return (
@@ -18,6 +19,7 @@ export function FilesPanel({ subject }: { subject: Subject }) {
         ))}
       </ul>
       {subject.files.includes("report.html") && <p><a href={fileAddress(subject.id, "report.html")} target="_blank" rel="noopener">Open the report in a new tab</a></p>}
+      {subject.files.includes("avatar.glb") && <ExportForm subject={subject} />}
       <details>
         <summary>All {subject.files.length} files of the folder</summary>
         <ul class="all-files">{subject.files.map((file) => <li key={file}><a href={fileAddress(subject.id, file)} download={file.split("/").pop()}>{file}</a></li>)}</ul>
