@@ -6,6 +6,7 @@ use toile_capture::CaptureError;
 use toile_character::CharacterError;
 use toile_live::LiveError;
 use toile_pipeline::PipelineError;
+use toile_service::ServiceError;
 
 /// Errors of the program.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +20,9 @@ pub enum StudioError {
     /// A device, its settings, or the permission to use it.
     #[error(transparent)]
     Live(LiveError),
+    /// The service cannot be opened.
+    #[error(transparent)]
+    Service(ServiceError),
     /// From a stage or its files.
     #[error(transparent)]
     Pipeline(PipelineError),
@@ -46,6 +50,7 @@ impl StudioError {
             Self::Usage(_) => "usage",
             Self::Signal(_) => "device",
             Self::Live(error) => error.kind(),
+            Self::Service(_) => "service",
             Self::Pipeline(error) => error.kind(),
         }
     }
@@ -55,7 +60,7 @@ impl StudioError {
         match self {
             Self::Pipeline(error) => error.file(),
             Self::Live(error) => error.file(),
-            Self::Usage(_) | Self::Signal(_) => None,
+            Self::Usage(_) | Self::Signal(_) | Self::Service(_) => None,
         }
     }
 
@@ -63,7 +68,7 @@ impl StudioError {
     pub fn field(&self) -> Option<&str> {
         match self {
             Self::Pipeline(error) => error.field_name(),
-            Self::Usage(_) | Self::Signal(_) | Self::Live(_) => None,
+            Self::Usage(_) | Self::Signal(_) | Self::Live(_) | Self::Service(_) => None,
         }
     }
 }

@@ -21,5 +21,6 @@ mod prior;
 pub mod process;
 mod reach;
 pub mod reorder;
+pub mod serve;
 pub mod settings;
 pub mod synthesize;

@@ -76,6 +76,11 @@ const TABLE: &[Row] = &[
         ],
         &["synthetic", "driver-synthetic"],
     ),
+    row(
+        "service",
+        &["geometry", "capture", "character", "garments", "render", "live", "pipeline"],
+        &["synthetic", "driver-synthetic"],
+    ),
     // The program and the end-to-end tests bring everything together.
     row("studio", ALL, ALL),
     row("outside", &[], &[]),
@@ -89,7 +94,9 @@ const ONLY: &[(&str, &[&str])] = &[
     ("clap", &["studio"]),
     ("clap_complete", &["studio"]),
     ("indicatif", &["studio"]),
-    ("axum", &["studio"]),
+    ("axum", &["service"]),
+    ("hyper", &["service"]),
+    ("rusqlite", &["service"]),
     ("anyhow", &["studio"]),
     ("tracing-subscriber", &["studio"]),
     ("rusb", &["driver-transport"]),
@@ -126,6 +133,7 @@ const NEVER: &[(&str, &[&str], &str)] = &[
         "does not share code with the drivers that it tests",
     ),
     ("studio", &["rasterize", "Bvh::new", "nalgebra::DMatrix", "faer::"], "does not hold algorithms"),
+    ("service", &["println!", "eprintln!", "std::process::exit", "clap"], "talks to no terminal"),
     ("pipeline", &["println!", "eprintln!", "std::io::stdout", "std::process::exit"], "talks to no terminal"),
     ("live", &["println!", "eprintln!", "std::io::stdout", "std::process::exit"], "talks to no terminal"),
 ];
