@@ -6,7 +6,9 @@ import { after, before, test } from "node:test";
 import { drawn, isAccessible, openBrowser, openPage, picture, windowPlaces } from "./browser.mjs";
 import { startService } from "./service.mjs";
 
-const TAKE_MS = 120_000;
+// The virtual person is drawn before the camera opens.
+const OPEN_MS = 240_000;
+const TAKE_MS = 240_000;
 const PROCESS_MS = 400_000;
 
 let service, browser, tab;
@@ -31,6 +33,8 @@ async function recordTake(page, layer) {
   await page.getByRole("button", { name: "End the take" }).waitFor();
   await page.locator(".ring").waitFor();
   await page.waitForTimeout(3000);
+  const { rate, age } = await page.locator(".pace").evaluate((told) => told.dataset);
+  console.log(`# ${layer}: ${rate} pictures a second, ${age} ms old`);
   await picture(page, `scan-${layer}-recording`);
   if (layer === "body") await isAccessible(page, "scan, recording");
   await page.getByRole("button", { name: "Keep, next layer" }).waitFor({ timeout: TAKE_MS });
@@ -51,14 +55,14 @@ test("a new subject is added and scanned in underwear, then in trousers", async 
   await picture(page, "scan-setup");
   await isAccessible(page, "scan, before");
   await page.getByRole("button", { name: "Open the camera" }).click();
-  await page.getByRole("button", { name: "Start", exact: true }).waitFor({ timeout: 60_000 });
+  await page.getByRole("button", { name: "Start", exact: true }).waitFor({ timeout: OPEN_MS });
   await page.waitForTimeout(1500);
   await picture(page, "scan-preview");
   await recordTake(page, "body");
   await picture(page, "scan-review");
   await isAccessible(page, "scan, after");
   await page.getByRole("button", { name: "Keep, next layer" }).click();
-  await page.getByRole("button", { name: "Start", exact: true }).waitFor({ timeout: 60_000 });
+  await page.getByRole("button", { name: "Start", exact: true }).waitFor({ timeout: OPEN_MS });
   await recordTake(page, "trousers");
   await page.getByRole("button", { name: "Keep, and finish" }).click();
   await page.getByRole("heading", { name: "Mira" }).waitFor();
