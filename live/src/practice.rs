@@ -13,6 +13,8 @@ use toile_synthetic::{SyntheticError, SyntheticSettings, Take};
 const FPS: f64 = 30.0;
 /// One turn of the disk: 24° a second.
 const TURN: Duration = Duration::from_secs(15);
+/// Views that are rendered of a turn, 2.4° apart; each is shown for three frames, so that the camera is open after seconds.
+const VIEWS: usize = 150;
 /// Frames that wait in a camera's buffers before it overwrites them.
 const BUFFERS: u64 = 10;
 
@@ -32,11 +34,10 @@ impl Practice {
     /// # Errors
     /// [`SyntheticError`] where a setting is out of range or the person has no such take.
     pub fn open(settings: &SyntheticSettings, take: usize) -> Result<Self, SyntheticError> {
-        let frames = (TURN.as_secs_f64() * FPS).round() as usize;
-        let degrees = 360.0 * (frames - 1) as f64 / frames as f64;
-        let settings = SyntheticSettings { frames, degrees, fps: FPS, ..settings.clone() };
+        let degrees = 360.0 * (VIEWS - 1) as f64 / VIEWS as f64;
+        let settings = SyntheticSettings { frames: VIEWS, degrees, fps: FPS, ..settings.clone() };
         let scene = toile_synthetic::Subject::new(&settings)?.take(take)?;
-        let turn: Vec<_> = (0..frames).into_par_iter().map(|k| packed(&scene, k)).collect::<Result<_, _>>()?;
+        let turn: Vec<_> = (0..VIEWS).into_par_iter().map(|k| packed(&scene, k)).collect::<Result<_, _>>()?;
         Ok(Self { rig: scene.rig(), turn, next: 0, given: 0, began: None })
     }
 
@@ -68,7 +69,8 @@ impl Source for Practice {
     fn next_frame(&mut self) -> Result<Option<Frame>, CaptureError> {
         let lost_before = self.wait();
         let number = self.next;
-        let (depth, color) = &self.turn[(number % self.turn.len() as u64) as usize];
+        let shown = number as f64 / (TURN.as_secs_f64() * FPS) * self.turn.len() as f64;
+        let (depth, color) = &self.turn[shown as usize % self.turn.len()];
         let wrong = |reason: String| CaptureError::Frame { index: number, reason };
         let depth = depth_codec::decode(depth).map_err(|error| wrong(error.to_string()))?;
         let index = self.given;

@@ -19,6 +19,7 @@ use crate::{
     console,
     error::Refusal,
     limits::{Common, Share},
+    pictures::What,
     routes::{archive, capture, devices, edits, events, files, jobs, metrics, session, subject},
     service::Service,
 };
@@ -32,6 +33,7 @@ const MOST_EDIT_BYTES: usize = 16 << 20;
 #[derive(OpenApi)]
 #[openapi(
     info(title = "Toile", description = "Scans of people, layer by layer, to animated avatars: the archive, its jobs, and the capture."),
+    components(schemas(What)),
     tags((name = "archive"), (name = "subjects"), (name = "edits"), (name = "jobs"), (name = "capture"), (name = "service"))
 )]
 struct Api;

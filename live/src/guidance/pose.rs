@@ -13,10 +13,13 @@ const REMEMBERED: usize = 450;
 const FRONTAL: f64 = 0.8;
 /// Before so many such outlines nothing is said.
 const ENOUGH: usize = 5;
-/// Between waist and hip an arm that hangs free is a piece of its own; empty columns of 2 cm that part it from the trunk. A
+/// Between hip and chest an arm that hangs free is a piece of its own; empty columns of 2 cm that part it from the trunk. A
 /// voxel of the scan is 4 mm, and flying pixels fill a gap of up to a pixel (6 mm) from either side.
 const GAP: usize = 2;
-const BAND: (f64, f64) = (0.50, 0.60);
+const BAND: (f64, f64) = (0.50, 0.72);
+/// Rows of 2 cm in which both arms are pieces of their own: as much as a hand is wide. In an A-pose the arms cross only a
+/// part of the band.
+const LEAST_FREE: usize = 4;
 
 /// Whether the person stands as the scan needs it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -36,12 +39,11 @@ impl Arms {
     pub fn push(&mut self, outline: &Outline) {
         let width = |row| outline.extent(row).map_or(0, |(first, last)| last + 1 - first);
         let shoulders = outline.rows(0.74, 0.84).map(width).max().unwrap_or(0) as f64;
-        let rows = outline.rows(BAND.0, BAND.1);
-        let free = rows.clone().filter(|row| outline.pieces(*row, GAP) >= 3).count();
+        let free = outline.rows(BAND.0, BAND.1).filter(|row| outline.pieces(*row, GAP) >= 3).count();
         if self.0.len() >= REMEMBERED {
             self.0.pop_front();
         }
-        self.0.push_back((shoulders, 2 * free > rows.len()));
+        self.0.push_back((shoulders, free >= LEAST_FREE));
     }
 
     /// What follows for the pose.

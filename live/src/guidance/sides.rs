@@ -73,7 +73,7 @@ mod tests {
             .values
             .iter_mut()
             .enumerate()
-            .filter(|(k, v)| k / 320 < 95 && k % 5 > 0 && **v == 2500)
+            .filter(|(k, v)| k / 320 < 101 && k % 5 > 0 && **v == 2500)
             .for_each(|(_, v)| *v = 0);
         let outline = Outline::new(&sensor(), &hidden, &volume()).unwrap();
         let mut unseen = Unseen::default();
