@@ -8,7 +8,7 @@ import type { LiveSurface } from "./live";
 
 /** The surface that the turn has made so far. */
 export default function SurfaceView({ surface }: { surface: LiveSurface | null }) {
-  const over = surface === null ? <p class="stage-note">The surface appears here while the take is recorded.</p> : null;
+  const over = surface === null ? <p class="stage-note">The surface of a take appears here while it is recorded.</p> : null;
   return (
     <Stage label="Live surface" over={over}>
       {(viewer) => <Shown viewer={viewer} surface={surface} />}
