@@ -34,7 +34,7 @@ const LISTED: usize = 200;
 /// A subject that another program holds is tried again after this long.
 const AGAIN: Duration = Duration::from_secs(2);
 /// A job that was begun this often and never ended (the service was killed each time) is given up.
-const MOST_ATTEMPTS: u64 = 5;
+const MOST_ATTEMPTS: u64 = 50;
 
 /// The queue, and the thread that works on it.
 pub struct Jobs {
