@@ -89,13 +89,16 @@ export function touched(graph: ScanGraph, { points, radius }: Stroke): number[] 
   return out;
 }
 
+/** A few vertices under a fold or a hem's step are no other part of the body; every stroke costs the program a rebuild of its labels. */
+const LEDGE_SHARE = 0.1;
+
 /**
  * The strokes that mark a region of the surface and nothing else. The file's brush is a ball: where it reaches another part of the
  * body through the air, such as the trunk from the arm, the stroke is written as dabs that stay on the region.
  */
 export function strokesFor(graph: ScanGraph, region: ReadonlyMap<number, number>, stroke: Stroke): Stroke[] {
   const isElsewhere = (v: number) => !region.has(v) && !touchesRegion(graph, region, v);
-  if (!touched(graph, stroke).some(isElsewhere)) return [stroke];
+  if (touched(graph, stroke).filter(isElsewhere).length <= LEDGE_SHARE * region.size) return [stroke];
   // A dab at the rim reaches a third of the radius further.
   const elsewhere = touched(graph, { ...stroke, radius: 1.5 * stroke.radius }).filter(isElsewhere);
   return dabs(graph, region, stroke, elsewhere);
