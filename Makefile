@@ -1,6 +1,6 @@
 # Two commands do everything on a fresh machine: `make demo` and `make test`.
 
-.PHONY: help setup build install demo test docs fuzz bench peers
+.PHONY: help setup console build install demo test docs fuzz bench peers
 .DEFAULT_GOAL := help
 
 TOILE := target/release/toile
@@ -12,8 +12,11 @@ help: ## List the targets
 setup: ## Install a C compiler and Rust where they are missing
 	@bash scripts/setup.sh
 
-build: setup ## Build the program
+build: setup console ## Build the program
 	bash scripts/cargo.sh build --release --locked --package toile-studio
+
+console: ## Build the page that `toile serve` shows (with Node, which is installed where it is missing)
+	@bash scripts/console.sh
 
 install: build ## Install the program as PREFIX/bin/toile (PREFIX is ~/.local where it is not given)
 	install -D $(TOILE) $(PREFIX)/bin/toile
@@ -24,6 +27,8 @@ demo: build ## Process the shipped recording to an avatar and say where to look
 
 test: demo ## The demo, then all tests, with the outside checkers that can be installed here
 	@bash scripts/outside.sh
+	@bash scripts/console.sh test
+	@bash scripts/console.sh e2e
 	bash scripts/cargo.sh test --release --locked --workspace
 	bash scripts/cargo.sh test --release --locked -p toile-driver-kinect2 --test endurance -- --ignored
 	@bash tests/readme.sh

@@ -15,17 +15,19 @@ use toile_driver_transport::{libusb::LibusbBus, video::kernel::KernelVideo};
 use toile_driver_uvc_depth::{self as uvc_depth, UvcDepthCamera};
 use toile_synthetic::{GarmentKind, GarmentSettings, SyntheticSettings};
 
-use crate::{DeviceError, LiveError, stop::Pace};
+use crate::{DeviceError, LiveError, practice::Practice, stop::Pace};
 
 /// How devices are written.
 pub const DEVICES: &str = "kinect1[:SERIAL], kinect2[:SERIAL], realsense[:SERIAL], uvc:NODE,CALIBRATION, stereo:FILE, replay:FILE, \
-     synthetic[:SEED]";
+     synthetic[:SEED], virtual[:SEED]";
 
 /// Where frames come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Device {
     /// The virtual sensor before a virtual person, who follows from the seed.
     Synthetic(u64),
+    /// The same person in front of a camera that does not wait: for practice.
+    Virtual(u64),
     /// A recording.
     Replay(PathBuf),
     /// The first Kinect v1, or that with this serial number.
@@ -46,10 +48,8 @@ impl FromStr for Device {
     fn from_str(text: &str) -> Result<Self, String> {
         let (kind, rest) = text.split_once(':').map_or((text, None), |(kind, rest)| (kind, Some(rest)));
         match (kind, rest) {
-            ("synthetic", None) => Ok(Self::Synthetic(1)),
-            ("synthetic", Some(seed)) => {
-                seed.parse().map(Self::Synthetic).map_err(|_| format!("`{seed}` is not a seed: give a whole number"))
-            }
+            ("synthetic", seed) => seed_of(seed).map(Self::Synthetic),
+            ("virtual", seed) => seed_of(seed).map(Self::Virtual),
             ("replay", Some(file)) => Ok(Self::Replay(file.into())),
             ("kinect1", serial) => Ok(Self::Kinect1(serial.map(String::from))),
             ("kinect2", serial) => Ok(Self::Kinect2(serial.map(String::from))),
@@ -69,7 +69,12 @@ impl Device {
     pub fn pace(&self) -> Pace {
         match self {
             Self::Synthetic(_) | Self::Replay(_) => Pace::OnDemand,
-            Self::Kinect1(_) | Self::Kinect2(_) | Self::Realsense(_) | Self::Stereo(_) | Self::Uvc(..) => Pace::Live,
+            Self::Virtual(_)
+            | Self::Kinect1(_)
+            | Self::Kinect2(_)
+            | Self::Realsense(_)
+            | Self::Stereo(_)
+            | Self::Uvc(..) => Pace::Live,
         }
     }
 
@@ -92,6 +97,10 @@ impl Device {
             Self::Synthetic(seed) => {
                 let settings = synthetic(*seed, subject, layer)?;
                 let opened = SyntheticDevice::open(&settings, layer.number);
+                Ok(Box::new(opened.map_err(DeviceError::from)?))
+            }
+            Self::Virtual(seed) => {
+                let opened = Practice::open(&synthetic(*seed, subject, layer)?, layer.number);
                 Ok(Box::new(opened.map_err(DeviceError::from)?))
             }
             Self::Replay(file) => Ok(Box::new(Replay::open(file)?)),
@@ -119,6 +128,11 @@ impl Device {
             }
         }
     }
+}
+
+/// The virtual person of this seed; the first one where none is given.
+fn seed_of(seed: Option<&str>) -> Result<u64, String> {
+    seed.unwrap_or("1").parse().map_err(|_| format!("`{}` is not a seed: give a whole number", seed.unwrap_or("")))
 }
 
 /// Settings of a stereo rig (TOML); files that they name are looked for beside them.
@@ -153,13 +167,14 @@ mod tests {
     fn devices_by_their_names() {
         assert_eq!("synthetic".parse(), Ok(Device::Synthetic(1)));
         assert_eq!("synthetic:42".parse(), Ok(Device::Synthetic(42)));
+        assert_eq!("virtual".parse(), Ok(Device::Virtual(1)));
         assert_eq!("kinect1:A1".parse(), Ok(Device::Kinect1(Some("A1".into()))));
         assert_eq!("kinect2".parse(), Ok(Device::Kinect2(None)));
         assert_eq!("realsense".parse(), Ok(Device::Realsense(None)));
         assert_eq!("stereo:rig.toml".parse(), Ok(Device::Stereo("rig.toml".into())));
         assert_eq!("replay:a:b.mcap".parse(), Ok(Device::Replay("a:b.mcap".into())));
         assert_eq!("uvc:/dev/video2,c.toml".parse(), Ok(Device::Uvc("/dev/video2".into(), "c.toml".into())));
-        for wrong in ["kinect9", "synthetic:x", "replay", "uvc:/dev/video2", ""] {
+        for wrong in ["kinect9", "synthetic:x", "virtual:", "replay", "uvc:/dev/video2", ""] {
             assert!(wrong.parse::<Device>().is_err(), "{wrong}");
         }
     }

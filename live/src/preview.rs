@@ -11,7 +11,11 @@ use toile_capture::{Frame, Rig};
 use toile_fusion::{FusionSettings, LiveFuser, Outcome, survey};
 use toile_geometry::Rigid;
 
-use crate::{stop::Pace, turn::Turn};
+use crate::{
+    stop::Pace,
+    surface::{Growing, Surfaces},
+    turn::Turn,
+};
 
 /// Frames of each sensor that may wait.
 const ROOM: usize = 8;
@@ -97,13 +101,13 @@ impl Preview {
     ///
     /// # Errors
     /// The system's error where there are no threads left.
-    pub fn start(rig: Rig, pace: Pace) -> std::io::Result<Self> {
+    pub fn start(rig: Rig, pace: Pace, surfaces: Option<Surfaces>) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let its = shared.clone();
         let room = ROOM * rig.sensors.len().max(1);
         let run = move || {
             let over = Over(its);
-            follow(&rig, &over.0);
+            follow(&rig, &over.0, &mut Growing::new(surfaces));
         };
         let thread = thread::Builder::new().name("preview".into()).spawn(run)?;
         Ok(Self { shared, thread: Some(thread), pace, room })
@@ -218,7 +222,7 @@ impl<'a> Sensors<'a> {
 }
 
 /// Looks for somebody who moves, then fuses; starts anew when it is lost, or another sensor leads.
-fn follow(rig: &Rig, shared: &Shared) {
+fn follow(rig: &Rig, shared: &Shared, growing: &mut Growing) {
     let settings = FusionSettings { voxel_size: VOXEL, truncation: 4.0 * VOXEL, ..FusionSettings::default() };
     let mut sensors = Sensors::new(rig, shared);
     let mut kept: Vec<Frame> = Vec::new();
@@ -238,7 +242,7 @@ fn follow(rig: &Rig, shared: &Shared) {
         if let Ok(volume) = survey(&leader, &kept, &settings)
             && let Ok(fuser) = LiveFuser::new(&leader, Some(volume), settings.clone())
         {
-            kept = fuse(fuser, std::mem::take(&mut kept), &mut sensors);
+            kept = fuse(fuser, std::mem::take(&mut kept), &mut sensors, growing);
             next_look = FIRST_LOOK;
         }
         if kept.len() > MAX_KEPT {
@@ -255,7 +259,7 @@ fn follow(rig: &Rig, shared: &Shared) {
 
 /// Fuses what was kept and what comes, until there is no more or it is lost. Returns the first frame of another sensor
 /// that leads now.
-fn fuse(mut fuser: LiveFuser, kept: Vec<Frame>, sensors: &mut Sensors<'_>) -> Vec<Frame> {
+fn fuse(mut fuser: LiveFuser, kept: Vec<Frame>, sensors: &mut Sensors<'_>, growing: &mut Growing) -> Vec<Frame> {
     let (shared, leader) = (sensors.shared, sensors.leader);
     shared.lock().seen.turn.start_anew();
     let (mut lost, mut pose) = (0, None);
@@ -285,6 +289,7 @@ fn fuse(mut fuser: LiveFuser, kept: Vec<Frame>, sensors: &mut Sensors<'_>) -> Ve
             Err(_) => break,
         }
         drop(state);
+        growing.show(&fuser);
         if lost >= LOST {
             break;
         }
@@ -329,7 +334,7 @@ mod tests {
     #[test]
     fn a_subject_that_is_lost_is_looked_for_anew_and_the_turn_goes_on() {
         let (rig, frames) = frames(52);
-        let preview = Preview::start(rig, Pace::OnDemand).unwrap();
+        let preview = Preview::start(rig, Pace::OnDemand, None).unwrap();
         let see = |range: &[Frame]| range.iter().for_each(|frame| preview.push(frame.clone()));
         see(&frames[..26]);
         // Somebody stands before the camera for fifteen frames.
@@ -353,7 +358,7 @@ mod tests {
         let (one, frames) = frames(60);
         let mut rig = Rig { sensors: vec![one.sensors[0].clone(), one.sensors[0].clone()] };
         rig.sensors[1].name = "second".into();
-        let preview = Preview::start(rig, Pace::OnDemand).unwrap();
+        let preview = Preview::start(rig, Pace::OnDemand, None).unwrap();
         // The first is unplugged after twelve frames; the second sees the same.
         for (i, frame) in frames.iter().cycle().take(12 + QUIET as usize + 30).enumerate() {
             if i < 12 {

@@ -18,6 +18,7 @@ use crate::{
     preview::{Preview, TurnSeen},
     status::{Counter, Status, disk_left},
     stop::{Pace, Stop},
+    surface::Surfaces,
 };
 
 /// Frames that may wait for the disk: ten seconds of a Kinect. Only beyond that does the device itself lose frames,
@@ -52,14 +53,29 @@ pub struct Recorded {
 /// # Errors
 /// [`LiveError`] where the file cannot be written (what is in it then stays readable as `.part`), or no frame came.
 pub fn record(
+    source: Box<dyn Source>,
+    path: &Path,
+    how: (Stop, Pace),
+    interrupted: &AtomicBool,
+    report: &mut dyn FnMut(&Status),
+) -> Result<Recorded, LiveError> {
+    record_seen(source, path, how, interrupted, None, report)
+}
+
+/// The same, with the surface that grows in `surfaces`.
+///
+/// # Errors
+/// As [`record`].
+pub fn record_seen(
     mut source: Box<dyn Source>,
     path: &Path,
     (stop, pace): (Stop, Pace),
     interrupted: &AtomicBool,
+    surfaces: Option<Surfaces>,
     report: &mut dyn FnMut(&Status),
 ) -> Result<Recorded, LiveError> {
     let recorder = Recorder::create(path, source.rig(), RecorderOptions::default())?;
-    let preview = Preview::start(source.rig().clone(), pace).map_err(|e| CaptureError::io(path, e))?;
+    let preview = Preview::start(source.rig().clone(), pace, surfaces).map_err(|e| CaptureError::io(path, e))?;
     let has_color = source.rig().sensors.iter().any(|s| s.color.is_some());
     let ends = AtomicBool::new(false);
     let (sender, frames) = mpsc::sync_channel(if pace == Pace::Live { ROOM } else { 2 });

@@ -68,6 +68,11 @@ impl Turn {
         self.last.map_or(0.0, |(_, turned)| turned.abs())
     }
 
+    /// Where the camera stands now about the subject: radians about +Y, 0 where it stood at the first frame.
+    pub fn direction(&self) -> Option<f64> {
+        self.last.map(|(direction, _)| direction)
+    }
+
     /// True after one full turn.
     pub fn is_full(&self) -> bool {
         self.angle() >= TAU + OVERLAP

@@ -134,6 +134,11 @@ impl PipelineError {
         Self::Format { path: path.to_path_buf(), field, reason: reason.to_string() }
     }
 
+    /// True where another program holds the subject.
+    pub fn is_busy(&self) -> bool {
+        matches!(self, Self::Busy { .. } | Self::Capture(CaptureError::Busy { .. }))
+    }
+
     /// A short name of the kind of error, for machines.
     pub fn kind(&self) -> &'static str {
         match self {

@@ -114,6 +114,12 @@ fn read_gltf(path: &Path) -> Result<Bvh, PipelineError> {
     Ok(Bvh { warnings: motion.warnings, ..bvh })
 }
 
+/// Seconds of the walk that ships with Toile, and its frames a second.
+pub fn walk_length() -> (f64, f64) {
+    // The program's own file is tested to be readable.
+    shipped_walk().map_or((0.0, 0.0), |walk| (walk.frame_time * walk.frames.len() as f64, 1.0 / walk.frame_time))
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::Point3;

@@ -5,8 +5,8 @@ use std::{collections::BTreeMap, path::Path};
 use serde::Serialize;
 use serde_json::Value;
 use toile_capture::{
-    files::is_there,
     Subject,
+    files::is_there,
     subject::{BODY, Layer},
 };
 

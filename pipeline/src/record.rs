@@ -87,6 +87,14 @@ pub(crate) fn files_in(folder: &Path) -> BTreeMap<String, BTreeSet<String>> {
     stages.into_iter().map(|(step, sealed)| (step, files(&sealed.record))).collect()
 }
 
+/// The records of all steps that worked in `folder`, by step, as far as they were not changed since.
+pub fn all_in(folder: &Path) -> Vec<(String, Record<Value>)> {
+    let stages = read_file(&report_path(folder)).unwrap_or_default().stages;
+    let whole =
+        stages.into_iter().filter(|(_, stage)| stage.seal.as_ref().is_some_and(|s| seal_of(&stage.record) == *s));
+    whole.filter_map(|(step, stage)| Some((step, serde_json::from_value(stage.record).ok()?))).collect()
+}
+
 /// Puts the record of `step` into the file of `folder`, beside those of other steps.
 ///
 /// # Errors

@@ -72,6 +72,8 @@ pub enum Command {
     Synthesize(commands::synthesize::Synthesize),
     /// List the cameras that are plugged in, and their problems
     Devices(commands::devices::Devices),
+    /// Serve an archive of subjects to the browser: scan, process, look, correct
+    Serve(commands::serve::Serve),
     /// Print completions for a shell
     Completions(commands::completions::Completions),
 }

@@ -7,6 +7,7 @@ use toile_capture::CaptureError;
 use toile_character::CharacterError;
 use toile_live::LiveError;
 use toile_pipeline::PipelineError;
+use toile_service::ServiceError;
 
 /// Errors of the program.
 #[derive(Debug, thiserror::Error)]
@@ -23,6 +24,9 @@ pub enum StudioError {
     /// From an archive.
     #[error(transparent)]
     Archive(ArchiveError),
+    /// The service cannot be opened.
+    #[error(transparent)]
+    Service(ServiceError),
     /// From a stage or its files.
     #[error(transparent)]
     Pipeline(PipelineError),
@@ -51,6 +55,7 @@ impl StudioError {
             Self::Signal(_) => "device",
             Self::Live(error) => error.kind(),
             Self::Archive(_) => "archive",
+            Self::Service(_) => "service",
             Self::Pipeline(error) => error.kind(),
         }
     }
@@ -61,7 +66,7 @@ impl StudioError {
             Self::Pipeline(error) => error.file(),
             Self::Live(error) => error.file(),
             Self::Archive(ArchiveError::Refused { path, .. } | ArchiveError::Catalog { path, .. }) => Some(path),
-            Self::Usage(_) | Self::Signal(_) | Self::Archive(_) => None,
+            Self::Usage(_) | Self::Signal(_) | Self::Archive(_) | Self::Service(_) => None,
         }
     }
 
@@ -69,7 +74,7 @@ impl StudioError {
     pub fn field(&self) -> Option<&str> {
         match self {
             Self::Pipeline(error) => error.field_name(),
-            Self::Usage(_) | Self::Signal(_) | Self::Live(_) | Self::Archive(_) => None,
+            Self::Usage(_) | Self::Signal(_) | Self::Live(_) | Self::Archive(_) | Self::Service(_) => None,
         }
     }
 }

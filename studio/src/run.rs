@@ -71,6 +71,7 @@ impl Command {
             Self::Settings(c) => c.run(session),
             Self::Synthesize(c) => c.run(session),
             Self::Devices(c) => c.run(session),
+            Self::Serve(c) => c.run(session),
             Self::Completions(c) => Ok(c.run(Cli::command())),
         }
     }
@@ -97,6 +98,7 @@ impl Command {
             Self::Settings(_) => "settings",
             Self::Synthesize(_) => "synthesize",
             Self::Devices(_) => "devices",
+            Self::Serve(_) => "serve",
             Self::Completions(_) => "completions",
         }
     }

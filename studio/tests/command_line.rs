@@ -34,6 +34,7 @@ fn help_shows_the_usual_way_and_every_command_has_an_example() {
         "demo",
         "synthesize",
         "completions",
+        "serve",
     ] {
         assert!(text.contains(command), "{command} is not in the help");
         let own = help(&[command, "--help"]);

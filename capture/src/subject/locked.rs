@@ -83,6 +83,15 @@ impl LockedSubject {
         self.save()
     }
 
+    /// Sets what the subject is called and saves.
+    ///
+    /// # Errors
+    /// [`CaptureError`] where `subject.toml` cannot be written.
+    pub fn set_name(&mut self, name: &str) -> Result<(), CaptureError> {
+        self.subject.about.name = name.to_string();
+        self.save()
+    }
+
     /// The next take, of a garment of type `garment`. `name` comes without a number, or with the number that the take will
     /// get.
     ///

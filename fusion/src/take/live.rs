@@ -1,9 +1,14 @@
 //! Following a subject while it is recorded.
 
 use toile_capture::{Frame, Rig};
+use toile_geometry::Mesh;
 
 use super::{Fuser, Outcome};
-use crate::{FusionError, FusionSettings, subject::SubjectVolume};
+use crate::{FusionError, FusionSettings, field::extract_surface, subject::SubjectVolume};
+
+/// Measurements (in the unit of the field's weights) below which a place of the surface is not shown: one look may be a
+/// flying pixel.
+const LEAST_WEIGHT: u16 = 2;
 
 /// A [`Fuser`] that is never finished: it tracks the same way, but keeps depth and colours of some thirty frames at most,
 /// however long the take is. A frame that is forgotten costs a few hundred bytes: its pose.
@@ -26,6 +31,11 @@ impl LiveFuser {
         let outcome = self.0.push(frame)?;
         self.0.kept.forget();
         Ok(outcome)
+    }
+
+    /// The surface so far: model frame (the scan frame as far as the volume knows it), metres, without colours.
+    pub fn surface(&self) -> Mesh {
+        extract_surface(&self.0.model.field, LEAST_WEIGHT)
     }
 }
 

@@ -1,24 +1,18 @@
 //! `toile devices`: the cameras that are plugged in, their speed, and their problems.
 
-use std::{
-    collections::BTreeSet,
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
 use serde_json::{Value, json};
 use toile_capture::printable_path;
 use toile_driver_realsense as realsense;
-use toile_driver_stereo::{self as stereo, nodes::WideNode};
+use toile_driver_stereo::nodes::WideNode;
 use toile_driver_transport::{
-    TransportError,
-    known::{self, Family},
     udev,
-    usb::{self, UsbCamera},
-    video::{NodeInfo, Video, kernel::KernelVideo},
+    usb::UsbCamera,
+    video::{Video, kernel::KernelVideo},
 };
-use toile_driver_uvc_depth::nodes::{self, DepthNode};
-use toile_driver_webcam as webcam;
-use toile_live::{DeviceError, LiveError};
+use toile_driver_uvc_depth::nodes::DepthNode;
+use toile_live::{DeviceError, Listing, LiveError};
 
 use crate::{StudioError, outcome::Answer, session::Session};
 
@@ -45,7 +39,7 @@ impl Devices {
     /// # Errors
     /// [`StudioError`] where the rule cannot be written.
     pub fn run(&self, _session: &Session) -> Result<Answer, StudioError> {
-        if self.install_udev_rules { install() } else { Ok(list()) }
+        if self.install_udev_rules { install() } else { Ok(list(Listing::now())) }
     }
 }
 
@@ -61,80 +55,18 @@ fn install() -> Result<Answer, StudioError> {
     Ok(Answer { text, results: json!({ "rule": printable_path(&path) }), ..Answer::default() })
 }
 
-/// Each kind of bus is asked by itself: that one cannot be read must not hide the others.
-fn list() -> Answer {
-    let mut answer = Answer::default();
-    let usb = usb::list().unwrap_or_else(|e| warn(&mut answer, &e));
-    let webcams = webcam::list().unwrap_or_else(|e| warn(&mut answer, &e));
-    list_all(answer, &usb, webcams, &KernelVideo::default())
-}
-
 /// Lists every camera once, as what `toile capture` drives it as.
-fn list_all(mut answer: Answer, usb: &[UsbCamera], webcams: Vec<(u32, String)>, video: &dyn Video) -> Answer {
-    let cameras = realsense::list(video).unwrap_or_else(|e| warn(&mut answer, &e));
-    let mut listed = nodes_already_listed(video);
-    let nodes: Vec<DepthNode> = nodes::list(video).into_iter().filter(|n| !listed.contains(&n.node)).collect();
-    listed.extend(nodes.iter().map(|n| n.node.clone()));
-    let wide: Vec<WideNode> = stereo::nodes::list(video).into_iter().filter(|n| !listed.contains(&n.node)).collect();
-    listed.extend(wide.iter().map(|n| n.node.clone()));
-    let is_new = |(index, _): &(u32, String)| !listed.contains(Path::new(&format!("/dev/video{index}")));
-    let webcams: Vec<(u32, String)> = webcams.into_iter().filter(is_new).collect();
-    answer.text = text(usb, &cameras, &nodes, &wide, &webcams);
-    let refused = refused(video);
-    if refused.is_empty() {
-        answer.warnings.extend(cameras.iter().filter_map(missing_nodes));
-    }
-    answer.warnings.extend(refused);
-    for camera in usb {
-        answer.warnings.extend(camera.problems.iter().map(|p| format!("{}: {p}", camera.name)));
-    }
-    answer.results = json!({
+fn list(listing: Listing) -> Answer {
+    let Listing { usb, realsense, uvc_depth, wide, webcams, warnings } = listing;
+    let text = text(&usb, &realsense, &uvc_depth, &wide, &webcams);
+    let results = json!({
         "usb": usb,
-        "realsense": cameras,
+        "realsense": realsense,
         "stereo": wide.iter().map(|n| json!({ "node": n.node, "name": n.name, "size": n.size })).collect::<Vec<Value>>(),
-        "uvc_depth": nodes.iter().map(|n| json!({ "node": n.node, "name": n.name })).collect::<Vec<Value>>(),
+        "uvc_depth": uvc_depth.iter().map(|n| json!({ "node": n.node, "name": n.name })).collect::<Vec<Value>>(),
         "webcams": webcams.iter().map(|(i, name)| json!({ "index": i, "name": name })).collect::<Vec<Value>>(),
     });
-    answer
-}
-
-/// Nodes of cameras that are listed with their USB device (also those that the kernel's own Kinect driver makes), and
-/// nodes without pictures.
-fn nodes_already_listed(video: &dyn Video) -> BTreeSet<PathBuf> {
-    let is_driven = |info: &NodeInfo| {
-        let known = info.usb.as_ref().and_then(|usb| known::find(usb.id.0, usb.id.1));
-        known.is_some_and(|known| known.family != Family::Orbbec)
-    };
-    let is_metadata = |info: &NodeInfo| video.open(&info.node).is_ok_and(|node| node.is_metadata());
-    let nodes = video.list().unwrap_or_default().into_iter();
-    nodes.filter(|info| is_driven(info) || is_metadata(info)).map(|info| info.node).collect()
-}
-
-/// Nodes that may not be opened, with what to do; once for a camera.
-fn refused(video: &dyn Video) -> Vec<String> {
-    let mut listed = BTreeSet::new();
-    let nodes = video.list().unwrap_or_default().into_iter();
-    let refused = nodes.filter_map(|info| match video.open(&info.node) {
-        Err(error @ TransportError::NodePermission { .. }) => {
-            Some((info.usb.map(|usb| usb.address), error.to_string()))
-        }
-        _ => None,
-    });
-    refused.filter(|(address, _)| address.is_none() || listed.insert(*address)).map(|(_, words)| words).collect()
-}
-
-fn warn<T>(answer: &mut Answer, error: &dyn std::fmt::Display) -> Vec<T> {
-    answer.warnings.push(error.to_string());
-    Vec::new()
-}
-
-/// The missing parts of a RealSense camera.
-fn missing_nodes(camera: &realsense::Camera) -> Option<String> {
-    let no_color = camera.color.is_none() && camera.has_color_part();
-    let parts = [("depth", camera.depth.is_none()), ("infrared", camera.infrared.is_none()), ("colour", no_color)];
-    let missing: Vec<&str> = parts.into_iter().filter(|(_, is_missing)| *is_missing).map(|(name, _)| name).collect();
-    let missing = (!missing.is_empty()).then(|| missing.join(" and "))?;
-    Some(format!("{}: the video node for {missing} is missing: unplug it and plug it in again", camera.name))
+    Answer { text, results, warnings, ..Answer::default() }
 }
 
 fn text(
@@ -180,8 +112,11 @@ mod tests {
     };
     use toile_driver_transport::{
         LinkSpeed,
+        known::Family,
         simulated::{SimulatedBus, SimulatedVideo},
     };
+
+    use toile_live::missing_nodes;
 
     use super::*;
 
@@ -211,7 +146,7 @@ mod tests {
         };
         // The system calls every node a webcam; a laptop's own is on no known device.
         let webcams = (0..9).map(|index| (index, format!("Node {index}"))).collect();
-        let answer = list_all(Answer::default(), &[usb], webcams, &SimulatedVideo::new(bus));
+        let answer = list(Listing::of(vec![usb], webcams, &SimulatedVideo::new(bus)));
         let lines: Vec<&str> = answer.text.lines().collect();
         let depth = "usb 001:001  RealSense D435 827313080543 (High speed): \
                      depth /dev/video0, infrared /dev/video2, colour /dev/video4";
@@ -224,7 +159,7 @@ mod tests {
 
     #[test]
     fn nothing_and_a_camera_that_lacks_a_node_are_said() {
-        let nothing = list_all(Answer::default(), &[], Vec::new(), &SimulatedVideo::new(SimulatedBus::default()));
+        let nothing = list(Listing::of(Vec::new(), Vec::new(), &SimulatedVideo::new(SimulatedBus::default())));
         assert_eq!(nothing.text, "No camera is plugged in.\n");
         let bus = SimulatedBus::default();
         bus.plug(Arc::new(Mutex::new(d435::d405(d435::Pattern::default(), Wire::Bulk))));
