@@ -122,7 +122,7 @@ fn descended(fitted: &mut ImplicitBody, samples: &Samples, iterations: usize) ->
 }
 
 /// How often what went astray is looked for.
-const CLEANINGS: usize = 4;
+const CLEANINGS: usize = 2;
 /// Steps with the first primitives, and after more were added; by then they are nearly in place.
 const FIRST_ITERATIONS: usize = 16;
 const NEXT_ITERATIONS: usize = 8;

@@ -14,7 +14,7 @@ use crate::{
 /// A ray that leaves the primitives so much farther out than the body shows one that sticks out, metres.
 const ASTRAY: f64 = 0.012;
 
-/// Indices of the primitives that make a ray at rest leave far outside of the body, ascending.
+/// Indices of the primitives that make a ray at rest leave far outside of the body and lie outside of it themselves, ascending.
 pub(super) fn stray(body: &ImplicitBody, samples: &Samples) -> Vec<usize> {
     let field = Field::new(body, &Pose::identity());
     let guilty = |s: &super::samples::Sample| {
@@ -23,10 +23,21 @@ pub(super) fn stray(body: &ImplicitBody, samples: &Samples) -> Vec<usize> {
         let depth = field.outermost(&ray)?;
         (depth > s.depth + ASTRAY).then(|| strongest(body, &field, &ray, depth)).flatten()
     };
-    let mut found: Vec<usize> = samples.rest().par_iter().filter_map(guilty).collect();
+    let is_outside = |k: &usize| lies_outside(body, samples, *k);
+    let mut found: Vec<usize> = samples.rest().par_iter().filter_map(guilty).filter(is_outside).collect();
     found.sort_unstable();
     found.dedup();
     found
+}
+
+/// Whether a primitive's centre lies beyond the skin, as the nearest sample at rest that its groups see has it.
+fn lies_outside(body: &ImplicitBody, samples: &Samples, k: usize) -> bool {
+    let primitive = &body.primitives[k];
+    let center = body.skeleton.position(primitive.joint) + primitive.state.center;
+    let seen = samples.rest().iter().filter(|s| primitive.groups.contains(s.group));
+    let distance = |s: &&super::samples::Sample| (s.point - center).norm_squared();
+    let nearest = seen.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    nearest.is_some_and(|s| (center - s.point).dot(&s.direction) > 0.0)
 }
 
 /// The primitive that gives most where a ray leaves.
