@@ -4,6 +4,8 @@
 //! REST.ply, BODY.json and POSE.json are what `toile fit` writes as `rest.ply`, `body.json` and `pose.json`. OUT is a folder:
 //! `body.toml`, `body.ply` in the pose, and level 3 of it, `body-3.ply`. The distances printed are to the skinned body.
 
+#![allow(clippy::print_stdout)] // an example speaks to its reader
+
 use std::{path::Path, time::Instant};
 
 use nalgebra::Point3;

@@ -137,8 +137,8 @@ impl Plan {
         let neck = draft.chest(&trunk, &holes);
         draft.neck(&neck);
         let seam = draft.seam();
-        for side in 0..2 {
-            draft.arm(side, &holes[side]);
+        for (side, hole) in holes.iter().enumerate() {
+            draft.arm(side, hole);
             draft.leg(side, &trunk, &seam);
         }
         Ok(draft.finished())

@@ -123,11 +123,7 @@ impl Draft<'_> {
                     (high[0], -(1.0 - u) * v),
                     (high[columns], -u * v),
                 ];
-                let is_inside = row < rows;
-                contour.push(match is_inside {
-                    true => self.node(2, Rule::Span(weights), group(u), 0.0),
-                    false => high[column],
-                });
+                contour.push(if row < rows { self.node(2, Rule::Span(weights), group(u), 0.0) } else { high[column] });
             }
             contour.push(last[row]);
             self.strip(&below, &contour);
