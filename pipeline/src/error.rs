@@ -95,6 +95,8 @@ pub enum Cause {
     #[error(transparent)]
     Avatar(#[from] AvatarError),
     #[error(transparent)]
+    Implicit(#[from] toile_implicit::ImplicitError),
+    #[error(transparent)]
     Render(#[from] RenderError),
     #[error(transparent)]
     Image(#[from] image::ImageError),

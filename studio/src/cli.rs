@@ -56,6 +56,8 @@ pub enum Command {
     Export(commands::export::Export),
     /// Move the layers through a motion: skinning and cloth, as point caches
     Animate(commands::animate::Animate),
+    /// The body as implicit primitives: a compact body that can be edited
+    Sculpt(commands::sculpt::Sculpt),
     /// Everything from recorded takes to avatar and report: runs whatever is missing
     Process(commands::process::Process),
     /// Process a whole archive: what is stale, side by side

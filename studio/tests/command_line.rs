@@ -23,6 +23,7 @@ fn help_shows_the_usual_way_and_every_command_has_an_example() {
         "reorder",
         "export",
         "animate",
+        "sculpt",
         "measure",
         "capture",
         "devices",

@@ -25,6 +25,7 @@ mod prior;
 pub mod process;
 mod reach;
 pub mod reorder;
+pub mod sculpt;
 pub mod serve;
 pub mod settings;
 pub mod synthesize;
