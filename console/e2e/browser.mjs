@@ -10,6 +10,9 @@ const PROGRAMS = ["/usr/bin/chromium", "/usr/bin/chromium-browser"];
 const DRAWING = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
+// Ends what hangs; a machine that does much beside may take its time.
+const WAIT_MS = 120_000;
+
 mkdirSync(PICTURES, { recursive: true });
 
 export async function openBrowser({ webgl = true } = {}) {
@@ -23,6 +26,7 @@ export async function openBrowser({ webgl = true } = {}) {
 export async function openPage(browser, address, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1440, height: 900 }, acceptDownloads: true, bypassCSP: false, ...options });
   const page = await context.newPage();
+  page.setDefaultTimeout(WAIT_MS);
   const faults = [];
   page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
   page.on("pageerror", (error) => faults.push(String(error)));
@@ -49,8 +53,8 @@ export async function isAccessible(page, name) {
 
 /** Waits until nothing is being read for the picture in space. */
 export async function drawn(page) {
-  await page.waitForFunction(() => document.querySelector("canvas")?.viewer?.content.children.length > 0, null, { timeout: 60_000 });
-  await page.waitForFunction(() => document.querySelector(".stage-busy") === null, null, { timeout: 60_000 });
+  await page.waitForFunction(() => document.querySelector("canvas")?.viewer?.content.children.length > 0, null);
+  await page.waitForFunction(() => document.querySelector(".stage-busy") === null, null);
 }
 
 /** Where points of the scene are in the window. */

@@ -60,7 +60,7 @@ enum Care {
 impl Care {
     /// Limit of the times that all layers are looked at.
     fn passes(self) -> usize {
-        if self == Self::Frame { 3 } else { 6 }
+        if self == Self::Frame { 2 } else { 6 }
     }
 
     /// Vertices this far from a place where layers come too near may move, metres. From one frame to the next layers come into each

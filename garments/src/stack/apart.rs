@@ -12,7 +12,7 @@ const GAP: f32 = 0.0008;
 /// Layers are looked for within this distance, metres: they were apart a frame ago.
 const REACH: f32 = 0.02;
 /// Rounds in each region: what is not parted by then waits for the next frame.
-const ROUNDS: usize = 40;
+const ROUNDS: usize = 24;
 
 /// Layers that move, kept apart in one pose after the other: [`stack`](super::stack) for a motion.
 pub struct Apart {

@@ -21,6 +21,9 @@ Examples:
   toile serve archive --port 8000
   toile serve archive --listen 192.168.0.4 --port 8443 --tls-cert studio.pem --tls-key studio.key";
 
+/// The port where none is given.
+pub const PORT: u16 = 8717;
+
 /// Serve an archive of subjects to the browser: scan, process, look, correct
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
@@ -28,7 +31,7 @@ pub struct Serve {
     /// The folder of subjects; created where it is missing
     archive: PathBuf,
     /// The port; 0 takes any that is free
-    #[arg(long, value_name = "N", default_value_t = 8717)]
+    #[arg(long, value_name = "N", default_value_t = PORT)]
     port: u16,
     /// An address of this machine that others may reach, instead of loopback; who asks must show a token then
     #[arg(long, value_name = "ADDR")]
