@@ -3,7 +3,8 @@
 # Where Node or the npm registry is missing, the program is built all the same; its page then says how to build the console.
 #   console.sh          installs Node where it is missing (Debian), the packages of package-lock.json, and builds
 #   console.sh test     runs the console's unit tests and checks its weight
-#   console.sh e2e      drives the built program in Debian's Chromium, which is installed where it is missing
+#   console.sh e2e      drives the pages of the built program in Debian's Chromium, which is installed where it is missing
+#   console.sh way      the whole way in the browser, from a new subject to an animated avatar; takes minutes and is no part of `make test`
 set -uo pipefail
 cd "$(dirname "$0")/../console"
 needed=18
@@ -54,9 +55,9 @@ if [ "${1:-}" = test ]; then
     npm test --silent && npm run check --silent
     exit
 fi
-if [ "${1:-}" = e2e ]; then
+if [ "${1:-}" = e2e ] || [ "${1:-}" = way ]; then
     command -v chromium >/dev/null || debian chromium || missing_browser
-    npm run e2e --silent
+    if [ "$1" = way ]; then npm run e2e:way --silent; else npm run e2e --silent; fi
     exit
 fi
 sum=$(sources | xargs cat | sha256sum | cut -d' ' -f1)

@@ -75,8 +75,8 @@ export function ArchivePage() {
       {error !== null && <p class="bad pad" role="alert">{error}</p>}
       {archive !== null && all.length === 0 && <Empty />}
       {archive !== null && all.length > 0 && shown.length === 0 && <p class="pad dim">No subject matches “{search}”.</p>}
-      <VirtualList label="Subjects" count={shown.length} rowHeight={ROW} keyOf={(k) => shown[k].id}
-        row={(k) => <SubjectRow subject={shown[k]} onRemove={remove} />} />
+      {shown.length > 0 && <VirtualList label="Subjects" count={shown.length} rowHeight={ROW} keyOf={(k) => shown[k].id}
+        row={(k) => <SubjectRow subject={shown[k]} onRemove={remove} />} />}
       {binOpen && <BinDialog onRestored={() => void read()} onClose={() => setBinOpen(false)} />}
       {adding && <NewSubject taken={all.map((s) => s.id)} onClose={() => setAdding(false)} />}
     </div>
@@ -100,7 +100,7 @@ async function removed(subject: SubjectLine, read: () => Promise<void>) {
 
 function Empty() {
   return (
-    <div class="empty">
+    <div class="nobody">
       <Icon name="person" />
       <p>Nobody was scanned into this archive yet.</p>
       <p class="dim">Add a subject, then scan the body and each garment over it. The virtual person lets you practise without a camera.</p>
