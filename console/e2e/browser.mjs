@@ -57,7 +57,26 @@ export async function drawn(page) {
   await page.waitForFunction(() => document.querySelector(".stage-busy") === null, null);
 }
 
-/** Where points of the scene are in the window. */
-export async function windowPlaces(page, points) {
-  return await page.evaluate((list) => list.map((point) => document.querySelector(".stage canvas").viewer.windowPlace(point)), points);
+/**
+ * Where a line down the surface is in the window: at the first height its point nearest to the camera, which nothing hides,
+ * at the others the points nearest to that. Which way a scan looks depends on the moment when its take began.
+ */
+export async function windowLine(page, heights) {
+  return await page.evaluate((list) => {
+    const { viewer } = document.querySelector(".stage canvas");
+    const points = [];
+    viewer.content.traverse((part) => {
+      if (!part.isMesh || !part.visible || part.geometry.getAttribute("position") === undefined) return;
+      const { array } = part.geometry.getAttribute("position");
+      for (let k = 0; k + 2 < array.length; k += 3) points.push([array[k], array[k + 1], array[k + 2]]);
+    });
+    const eye = viewer.camera.position;
+    let from = [eye.x, eye.y, eye.z];
+    return list.map((height) => {
+      const far = (p) => (p[0] - from[0]) ** 2 + (p[2] - from[2]) ** 2;
+      const level = points.filter((p) => Math.abs(p[1] - height) < 0.015);
+      from = level.reduce((best, p) => (far(p) < far(best) ? p : best));
+      return viewer.windowPlace(from);
+    });
+  }, heights);
 }
