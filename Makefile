@@ -1,13 +1,13 @@
 # Two commands do everything on a fresh machine: `make demo` and `make test`.
 
-.PHONY: help setup console build install demo test docs fuzz bench peers
+.PHONY: help setup console build install demo test docs fuzz bench peers batch-trial
 .DEFAULT_GOAL := help
 
 TOILE := target/release/toile
 PREFIX ?= $(HOME)/.local
 
 help: ## List the targets
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 13
 
 setup: ## Install a C compiler and Rust where they are missing
 	@bash scripts/setup.sh
@@ -32,7 +32,6 @@ test: demo ## The demo, then all tests, with the outside checkers that can be in
 	bash scripts/cargo.sh test --release --locked --workspace
 	bash scripts/cargo.sh test --release --locked -p toile-driver-kinect2 --test endurance -- --ignored
 	@bash tests/readme.sh
-	@bash tests/batch/batch.sh
 	@bash tests/wire/wire.sh
 
 docs: setup ## Build the book (target/book) and the API reference (target/doc)
@@ -47,3 +46,6 @@ peers: build ## Compare fusion with Open3D and small_gicp (from PyPI) on the sam
 
 fuzz: setup ## Fuzz all parsers of outside data for 10 minutes in all; SECONDS=n for another time
 	bash fuzz/run.sh $(SECONDS)
+
+batch-trial: build ## A batch on a Ray cluster (from PyPI) whose worker, driver and node are killed; no part of `make test`
+	@bash tests/batch/batch.sh

@@ -2,7 +2,6 @@
 # Outside programs that the tests ask about our files. Each is optional: a test whose program is missing says so and passes.
 # With TOILE_REQUIRE_OUTSIDE=1 the test fails instead, and so does this script.
 #   target/outside/node_modules/gltf-validator   Khronos' glTF validator (npm)
-#   target/outside/batch/                        Ray (PyPI): a cluster
 #   assimp                                       loads GLB (Debian's assimp-utils)
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -22,13 +21,6 @@ if [ ! -d target/outside/node_modules/gltf-validator ]; then
     else
         missing gltf-validator "it is installed with npm, which is missing too"
     fi
-fi
-
-# Ray, for the trial of batches in tests/batch.
-if [ ! -x target/outside/batch/bin/ray ]; then
-    echo "outside: installing ray"
-    { python3 -m venv target/outside/batch && timeout 240 target/outside/batch/bin/pip install -q "ray==2.*" psutil; } >target/outside/batch.log 2>&1 ||
-        echo "outside: ray could not be installed (target/outside/batch.log): the trial of batches will say SKIPPED"
 fi
 
 if ! command -v assimp >/dev/null; then
