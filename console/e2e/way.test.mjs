@@ -48,7 +48,10 @@ async function recordTake(page, layer) {
     await page.waitForTimeout(500);
   }
   if (!(await kept.isVisible())) await page.getByRole("button", { name: "End the take" }).click({ timeout: 5000 }).catch(() => console.log(`# ${layer}: ended by itself meanwhile`));
-  await kept.waitFor({ timeout: TAKE_MS });
+  await kept.waitFor({ timeout: TAKE_MS }).catch(async (error) => {
+    await picture(page, "scan-stuck");
+    throw error;
+  });
 }
 
 async function jobDone(page) {

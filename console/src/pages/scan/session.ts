@@ -1,7 +1,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { Capture, NextLayer } from "../../api/types";
-import { capture as captureStore, readCapture } from "../../state/capture";
+import { askCapture, capture as captureStore, readCapture } from "../../state/capture";
 import { useStore } from "../../state/store";
 import { actionOf, type Action } from "./action";
 import { TONES } from "./cues";
@@ -64,36 +64,36 @@ export function useSession(subject: string | null): Session {
   };
   const idle = capture?.state === "idle";
   useEffect(() => void propose().catch((e: unknown) => setError(String(e instanceof Error ? e.message : e))), [subject, idle]);
-  useCountdown(counting, setCounting, () => void attempt(async () => captureStore.set(await api.captureStep("start"))));
+  useCountdown(counting, setCounting, () => void attempt(() => askCapture(() => api.captureStep("start"))));
   useEffect(() => {
     if (capture?.state !== "preview") setCounting(null);
   }, [capture?.state]);
   const open = async (wanted: Choice) => {
     if (subject === null) throw new Error("Choose a subject first.");
     const type = wanted.type === "" ? {} : { type: wanted.type };
-    captureStore.set(await api.open({ device: wanted.device, subject, name: wanted.name, ...type }));
+    await askCapture(() => api.open({ device: wanted.device, subject, name: wanted.name, ...type }));
   };
   const goOn = async () => {
     const device = capture?.device ?? choice.device;
-    captureStore.set(await api.accept(null));
+    await askCapture(() => api.accept(null));
     const proposed = await propose();
     if (proposed !== null && proposed.name !== "") await open({ device, name: proposed.name, type: proposed.type ?? "" });
   };
   const action = actionOf(capture, counting !== null);
   const steps: Record<Action, () => void> = {
     open: () => void attempt(() => open(choice)),
-    start: () => (countdown === 0 ? void attempt(async () => captureStore.set(await api.captureStep("start"))) : setCounting(countdown)),
+    start: () => (countdown === 0 ? void attempt(() => askCapture(() => api.captureStep("start"))) : setCounting(countdown)),
     unstart: () => setCounting(null),
-    stop: () => void attempt(async () => captureStore.set(await api.captureStep("stop"))),
+    stop: () => void attempt(() => askCapture(() => api.captureStep("stop"))),
     accept: () => void attempt(goOn),
-    close: () => void attempt(async () => captureStore.set(await api.captureStep("discard"))),
+    close: () => void attempt(() => askCapture(() => api.captureStep("discard"))),
   };
   return {
     capture, next, choice, setChoice, counting, countdown, setCountdown, action, error,
     run: () => action !== null && steps[action](),
-    retake: () => void attempt(async () => captureStore.set(await api.captureStep("retake"))),
-    discard: () => void attempt(async () => captureStore.set(await api.captureStep("discard"))),
-    finish: () => attempt(async () => captureStore.set(await api.accept(null))),
+    retake: () => void attempt(() => askCapture(() => api.captureStep("retake"))),
+    discard: () => void attempt(() => askCapture(() => api.captureStep("discard"))),
+    finish: () => attempt(() => askCapture(() => api.accept(null))),
   };
 }
 
