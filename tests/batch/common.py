@@ -23,9 +23,9 @@ def toile(*words, **more):
 
 
 def small_subject(folder):
-    """A person without clothes, of 30 frames: the subject as it was recorded, and a copy that was processed alone."""
+    """A person without clothes, of 16 frames: the subject as it was recorded, and a copy that was processed alone."""
     recorded, alone = os.path.join(folder, "recorded"), os.path.join(folder, "alone")
-    toile("synthesize", "--out", recorded, "--seed", "3", "--frames", "30", "--garments", "")
+    toile("synthesize", "--out", recorded, "--seed", "3", "--frames", "16", "--garments", "")
     copy_takes(recorded, alone)
     answer, code = toile("process", alone)
     assert code == 0, answer
