@@ -1,6 +1,6 @@
 // What holds for every page: quick with thousands of subjects, sizes and colours, keyboard, lost service, no WebGL.
 import assert from "node:assert/strict";
-import { mkdirSync, writeFileSync } from "node:fs";
+import { mkdirSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { isAccessible, openBrowser, openPage, picture } from "./browser.mjs";
@@ -110,4 +110,5 @@ test("a service that dies is told, and the page finds it again by itself", async
   await page.getByText("The service does not answer").waitFor({ state: "detached" });
   await close();
   await again.end();
+  rmSync(own.archive, { recursive: true, force: true });
 });
