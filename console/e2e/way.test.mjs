@@ -32,7 +32,7 @@ const subjectFile = (file) => join(service.archive, "mira", file);
 
 async function recordTake(page, layer) {
   await page.getByLabel("Countdown").selectOption("0");
-  await page.waitForFunction(() => Number(document.querySelector(".pace")?.dataset.rate) > 0, null, { timeout: 30_000 });
+  await page.waitForFunction(() => Number(document.querySelector(".pace")?.dataset.rate) > 0, null, { timeout: 120_000 });
   await page.getByRole("button", { name: "Start", exact: true }).click();
   await page.getByRole("button", { name: "End the take" }).waitFor();
   await page.locator(".ring").waitFor();
