@@ -55,6 +55,12 @@ async function recordTake(page, layer) {
 }
 
 async function jobDone(page) {
+  // The page knows of a job a moment after it was opened; the service knows it at once.
+  const atWork = () => page.evaluate(async () => (await (await fetch("/api/jobs")).json()).some((job) => ["queued", "running"].includes(job.state)));
+  for (const began = Date.now(); await atWork(); ) {
+    assert.ok(Date.now() - began < PROCESS_MS, "the job does not end");
+    await page.waitForTimeout(500);
+  }
   await page.waitForFunction(() => document.querySelector(".subject-job") === null, null, { timeout: PROCESS_MS });
 }
 
