@@ -152,9 +152,9 @@ mod tests {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (seed >> 8) as f32 / 16_777_216.0
         };
-        // Shifted by up to one and a half of its edges, so that some triangles are turned over and others lie open.
+        // Shifted by up to half and up to three of its edges, so that some triangles are turned over and others lie open.
         let mut at = |v: u32| {
-            let shift = if v / n < n / 2 { 0.5 } else { 1.5 };
+            let shift = if v / n < n / 2 { 0.5 } else { 3.0 };
             Point3::new((v % n) as f32 + shift * random(), shift * random(), (v / n) as f32 + shift * random())
         };
         let positions = (0..n * n).map(&mut at).collect();

@@ -165,7 +165,9 @@ fn bake(
         let begun = Instant::now();
         let is_apart = match options.blend {
             Blend::Skinning => wearer.advance(pose, motion.frame_time).map(|()| false),
-            _ => frame(&mut wearer, &mut apart, &motion.poses[k.saturating_sub(1)], pose, motion.frame_time),
+            Blend::Anchored => {
+                frame(&mut wearer, &mut apart, &motion.poses[k.saturating_sub(1)], pose, motion.frame_time)
+            }
         };
         let is_apart = is_apart.map_err(|e| wrong(&e))?;
         let milliseconds = begun.elapsed().as_secs_f64() * 1e3;

@@ -80,7 +80,6 @@ pub fn kind(name: &str) -> &'static str {
         "woff2" => "font/woff2",
         "wasm" => "application/wasm",
         "glb" | "vrm" => "model/gltf-binary",
-        "ply" | "pc2" | "mcap" => "application/octet-stream",
         "csv" => "text/csv; charset=utf-8",
         "txt" | "toml" | "tum" | "log" => "text/plain; charset=utf-8",
         _ => "application/octet-stream",

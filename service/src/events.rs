@@ -27,20 +27,20 @@ impl Events {
 
     /// A job was entered, is somewhere else, or has ended.
     pub fn job(&self, job: &impl Serialize) {
-        self.tell(json!({ "job": job }));
+        self.tell(&json!({ "job": job }));
     }
 
     /// The capture stands otherwise than before.
     pub fn capture(&self, capture: &impl Serialize) {
-        self.tell(json!({ "capture": capture }));
+        self.tell(&json!({ "capture": capture }));
     }
 
     /// Subjects were made, changed or removed.
     pub fn archive_changed(&self) {
-        self.tell(json!({ "archive": "changed" }));
+        self.tell(&json!({ "archive": "changed" }));
     }
 
-    fn tell(&self, event: Value) {
+    fn tell(&self, event: &Value) {
         // That nobody listens is no error.
         drop(self.0.send(event.to_string().into()));
     }

@@ -84,9 +84,9 @@ fn surfaces(root: &std::path::Path) -> Result<(Vec<PathBuf>, u64), Refusal> {
     // The scan of the undressed person has the skin's colours.
     let below = subject.layers().first().map(|layer| folders.scan(&layer.label())).filter(|path| path.exists());
     if files.is_empty() {
-        files.extend(last_scan())
+        files.extend(last_scan());
     } else {
-        files.extend(below)
+        files.extend(below);
     }
     let time = |path: &PathBuf| {
         let modified = fs::metadata(path).and_then(|about| about.modified()).ok()?;

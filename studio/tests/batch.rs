@@ -1,4 +1,5 @@
 //! Archives: what is stale, side by side, killed and gone on, the catalogue, packing and forgetting.
+#![allow(clippy::unwrap_used)] // all of it is test code
 
 mod common;
 

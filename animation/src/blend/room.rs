@@ -111,8 +111,7 @@ impl<'a> Clothed<'a> {
             let shoulder = frames[arm.upper.index()].translation.vector;
             let overlap = |angle: f64| {
                 let turn = UnitQuaternion::from_axis_angle(&axis, angle);
-                let lack =
-                    |(p, needed): &(Point3<f64>, f64)| needed - skin.height(&(turn * (p - shoulder) + shoulder).into());
+                let lack = |(p, needed): &(Point3<f64>, f64)| needed - skin.height(&(turn * (p - shoulder) + shoulder));
                 stations.iter().map(lack).fold(f64::NEG_INFINITY, f64::max)
             };
             least(overlap)
@@ -158,7 +157,7 @@ fn least(overlap: impl Fn(f64) -> f64) -> f64 {
         if left <= LEFT_OVER {
             let (mut low, mut high) = (angle - step, angle);
             for _ in 0..HALVINGS {
-                let middle = (low + high) / 2.0;
+                let middle = f64::midpoint(low, high);
                 if overlap(middle) <= LEFT_OVER { high = middle } else { low = middle }
             }
             return high;

@@ -86,7 +86,7 @@ impl Outlook {
 
     /// Expected seconds of all that is due, one after the other.
     pub fn seconds(&self) -> f64 {
-        self.due().map(|(_, plan)| plan.seconds).sum()
+        self.due().fold(0.0, |sum, (_, plan)| sum + plan.seconds)
     }
 }
 

@@ -125,7 +125,7 @@ impl<'a> Batch<'a> {
                 return Ok(());
             }
             match receive.recv_timeout(TICK) {
-                Ok((task, outcome)) => self.take_in(task, outcome?)?,
+                Ok((task, outcome)) => self.take_in(task, &outcome?)?,
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
             }
         }
@@ -210,7 +210,7 @@ impl<'a> Batch<'a> {
     }
 
     /// Takes in how a process ended.
-    fn take_in(&mut self, mut task: Task, outcome: Outcome) -> Result<(), ArchiveError> {
+    fn take_in(&mut self, mut task: Task, outcome: &Outcome) -> Result<(), ArchiveError> {
         self.kept.retain(|kept| kept.0 != task.subject);
         task.cpu_seconds += outcome.cpu_seconds;
         self.ledger.totals.cpu_seconds += outcome.cpu_seconds;
@@ -224,7 +224,7 @@ impl<'a> Batch<'a> {
         self.seen = self.seen.max(Some(outcome.peak_memory_bytes));
         if outcome.has_result() || outcome.kind() == "disk-full" || task.attempts >= ATTEMPTS {
             self.ledger.totals.disk_full |= outcome.kind() == "disk-full";
-            let ended = task.ended(&outcome);
+            let ended = task.ended(outcome);
             return self.ledger.end(task.seconds, ended);
         }
         (self.ledger.hear)(&Event::Again { subject: &task.subject, why: &outcome.why() });

@@ -151,7 +151,7 @@ fn end_of(path: &Path) -> String {
     let read = File::open(path).and_then(|mut file| {
         let length = file.metadata()?.len();
         file.seek(SeekFrom::Start(length.saturating_sub(KEPT)))?;
-        file.read_to_end(&mut bytes)
+        file.take(KEPT).read_to_end(&mut bytes)
     });
     read.map_or_else(|_| String::new(), |_| String::from_utf8_lossy(&bytes).into_owned())
 }

@@ -184,7 +184,7 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
     match version {
         VERSION => connection.query_row("SELECT count(*) FROM subjects", [], |row| row.get::<_, i64>(0)).map(drop)?,
         0 => {
-            connection.execute_batch(&format!("BEGIN IMMEDIATE; {SCHEMA} PRAGMA user_version = {VERSION}; COMMIT;"))?
+            connection.execute_batch(&format!("BEGIN IMMEDIATE; {SCHEMA} PRAGMA user_version = {VERSION}; COMMIT;"))?;
         }
         _ => return Err(rusqlite::Error::InvalidQuery),
     }

@@ -113,7 +113,7 @@ fn ask(connection: &Connection, sql: &str, since: &str) -> rusqlite::Result<Tabl
         Ok(version_number(&context.get::<Option<String>>(0)?.unwrap_or_default()))
     })?;
     let mut statement = connection.prepare(sql)?;
-    let columns: Vec<String> = statement.column_names().into_iter().map(String::from).collect();
+    let columns: Vec<String> = statement.column_names().map(String::from).collect();
     if let Some(at) = statement.parameter_index(":since")? {
         statement.raw_bind_parameter(at, since)?;
     }

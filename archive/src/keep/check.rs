@@ -53,6 +53,8 @@ fn check_subject(archive: &Path, subject: PathBuf) -> Checked {
         }
         Err(error) => checked.lost.push(error.to_string()),
     }
+    // A fault of a recording is both unreadable and a problem of the take.
+    checked.lost.dedup();
     let mut seen = BTreeMap::new();
     for (name, hash) in noted(&root) {
         let now = seen.entry(name.clone()).or_insert_with(|| hash_file(&root.join(&name)).ok());

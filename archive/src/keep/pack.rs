@@ -95,7 +95,8 @@ fn manifest(
 ) -> Result<Manifest, ArchiveError> {
     let mut files = std::collections::BTreeMap::new();
     for name in list(root)? {
-        let is_source = ["takes/", "edits/"].iter().any(|folder| name.starts_with(folder)) || name.ends_with(".toml");
+        let is_source = ["takes/", "edits/"].iter().any(|folder| name.starts_with(folder))
+            || Path::new(&name).extension().is_some_and(|e| e == "toml");
         if name.contains(".part") || (takes_only && !is_source) {
             continue;
         }

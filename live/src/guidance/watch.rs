@@ -117,13 +117,16 @@ impl Watch {
 
     /// Looks at a frame.
     pub fn push(&mut self, frame: &Frame, dropped: u64) {
-        let Some(sensor) = self.rig.sensors.get(frame.sensor).filter(|_| frame.sensor == 0) else { return };
+        if frame.sensor != 0 || self.rig.sensors.is_empty() {
+            return;
+        }
         self.guidance.sensor = SensorHealth { hot: false, silent_s: 0.0, dropped };
         let Some(depth) = &frame.depth else { return };
-        let outline = self.volume.as_ref().and_then(|volume| Outline::new(sensor, depth, volume));
         if self.volume.is_none() {
             self.look_for_somebody(frame);
         }
+        let sensor = &self.rig.sensors[frame.sensor];
+        let outline = self.volume.as_ref().and_then(|volume| Outline::new(sensor, depth, volume));
         self.guidance.distance_m = outline.as_ref().map(|o| o.distance_m);
         self.guidance.height_m = outline.as_ref().map(|o| o.height_m);
         self.guidance.in_volume = outline.as_ref().is_some_and(|o| o.is_whole);

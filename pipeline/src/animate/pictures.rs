@@ -1,6 +1,9 @@
 //! A motion as pictures: a film that goes round, and where the cloth stretches and leaves its skinned place.
 
-use std::path::Path;
+use std::{
+    f64::consts::{FRAC_PI_2, PI},
+    path::Path,
+};
 
 use nalgebra::Point3;
 use toile_avatar::Avatar;
@@ -21,7 +24,7 @@ const STILL: (u32, u32) = (300, 400);
 const LIMIT: usize = 3_000_000;
 /// Directions from which a still is seen, radians around +Y.
 const HEADINGS: [(f64, &str); 5] =
-    [(0.0, "front"), (0.8, "left front"), (1.57, "left"), (3.14, "back"), (-0.8, "right front")];
+    [(0.0, "front"), (0.8, "left front"), (FRAC_PI_2, "left"), (PI, "back"), (-0.8, "right front")];
 /// What is shown around the hips as shares of the person's height: half the width, how far below them, and the whole height.
 const WIDTH: f32 = 0.36;
 const BELOW: f32 = 0.58;

@@ -15,9 +15,12 @@ const KEPT: usize = 16;
 
 type Stamp = (u64, Option<SystemTime>);
 
+/// Recordings by their path: when they were written, when they were last asked for, and what is in them.
+type Known = BTreeMap<PathBuf, (Stamp, u64, Arc<Replay>)>;
+
 /// The recordings that were looked at last.
 #[derive(Default)]
-pub struct Recordings(Mutex<BTreeMap<PathBuf, (Stamp, u64, Arc<Replay>)>>);
+pub struct Recordings(Mutex<Known>);
 
 impl Recordings {
     /// The recording at `path`.

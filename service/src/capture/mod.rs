@@ -133,7 +133,7 @@ impl Capture {
     /// # Errors
     /// 409 where no camera is ready.
     pub fn start(&self) -> Result<Now, Refusal> {
-        self.with(|session, shared| session.start(shared))
+        self.with(session::Session::start)
     }
 
     /// Ends the recording, whole.

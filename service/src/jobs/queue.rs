@@ -329,7 +329,7 @@ impl Shared {
             Ended::Failed(sentence) => (job.state, job.error) = (JobState::Failed, Some(sentence)),
             // The service ends: the job goes on when it comes back.
             Ended::Cancelled if queue.ends => {
-                (job.state, job.ended, job.attempt) = (JobState::Queued, None, job.attempt - 1)
+                (job.state, job.ended, job.attempt) = (JobState::Queued, None, job.attempt - 1);
             }
             Ended::Cancelled => job.state = JobState::Cancelled,
             Ended::Busy => {

@@ -203,7 +203,7 @@ fn size(text: &str) -> Result<u64, String> {
         _ => return Err(wrong()),
     };
     let bytes = factor * digits.parse::<f64>().map_err(|_| wrong())?;
-    if bytes >= 1.0 && bytes < 1e15 { Ok(bytes as u64) } else { Err(wrong()) }
+    if (1.0..1e15).contains(&bytes) { Ok(bytes as u64) } else { Err(wrong()) }
 }
 
 fn step(text: &str) -> Result<String, String> {

@@ -62,7 +62,7 @@ impl Demo {
             session,
         )?;
         answer.text.push_str("open the report in a browser; drop the GLB into Blender, or any viewer of glTF\n");
-        let program = std::env::current_exe().map_or_else(|_| "toile".into(), |path| printable_path(&path).to_string());
+        let program = std::env::current_exe().map_or_else(|_| "toile".into(), |path| printable_path(&path).clone());
         answer.text.push_str(&format!(
             "or work on it in the browser: `{program} serve {}` shows it at http://127.0.0.1:{}\n",
             printable_path(&out),

@@ -36,7 +36,7 @@ impl Sculpt {
         must_exist(&self.subject)?;
         let Sculpted { files, fitted, bytes, remarks } =
             sculpt(&self.subject, self.settings.as_deref(), session.progress.as_ref())?;
-        let paths = files.iter().map(|path| printable_path(path).to_string());
+        let paths = files.iter().map(|path| printable_path(path).clone());
         let text = format!(
             "{}\n{} primitives in {:.1} kB; their surface is {:.2} mm from the body on average, 95 % of it within {:.2} mm\n",
             paths.clone().collect::<Vec<_>>().join("\n"),
