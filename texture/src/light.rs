@@ -3,7 +3,9 @@
 //! A person turns before lamps that rest, so that each place of the surface is seen in changing light; its own colour is what
 //! does not change. Of vertex v in picture f the camera gives
 //!
-//!     ln I = a(v) + e(f) + k·(r², r⁴) + b·(x, z) + ln E(n),   E(n) = w0 + Σ wj max(0, n·dj)
+//! ```text
+//! ln I = a(v) + e(f) + k·(r², r⁴) + b·(x, z) + ln E(n),   E(n) = w0 + Σ wj max(0, n·dj)
+//! ```
 //!
 //! with the vertex's own colour a, the exposure e, the lens's fall-off over the distance r from the axis, a slope of brightness over
 //! the room, and the light E that falls on a normal n from lamps in directions dj all around, none of them negative (Lambert's law;
