@@ -351,7 +351,7 @@ fn layers_move_nearly_without_crossing() {
     let caches =
         |folder: &Path| files(folder).into_iter().filter(|f| f.0 != Path::new("report.json")).collect::<Vec<_>>();
     let before = caches(&folder);
-    assert_eq!(before.len(), layers.len() + 1, "a cache a layer, and motion.glb");
+    assert_eq!(before.len(), layers.len() + 3, "a cache a layer, motion.glb, film.gif and stills.png");
     animate("1");
     assert!(caches(&folder) == before, "another number of threads gives other bytes");
 }

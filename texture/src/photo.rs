@@ -155,8 +155,8 @@ pub(crate) fn srgb_of_linear(c: f32) -> f32 {
 /// # Errors
 /// [`TextureError::Size`] of the first of a wrong size; [`TextureError::NothingSeen`] where none shows the surface.
 pub(crate) fn shots(photos: &[Photo], mesh: &Mesh) -> Result<Vec<Shot>, TextureError> {
-    let all: Vec<Option<Shot>> =
-        photos.par_iter().map(|photo| Shot::new(photo, mesh)).collect::<Result<_, TextureError>>()?;
-    let shots: Vec<Shot> = all.into_iter().flatten().collect();
+    let all: Vec<Result<Option<Shot>, TextureError>> = photos.par_iter().map(|photo| Shot::new(photo, mesh)).collect();
+    // One after the other, so that the error is that of the first picture for any number of threads.
+    let shots: Vec<Shot> = all.into_iter().filter_map(Result::transpose).collect::<Result<_, _>>()?;
     if shots.is_empty() { Err(TextureError::NothingSeen { photos: photos.len() }) } else { Ok(shots) }
 }

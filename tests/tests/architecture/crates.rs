@@ -70,6 +70,7 @@ const TABLE: &[Row] = &[
             "fusion",
             "texture",
             "character",
+            "implicit",
             "fitting",
             "garments",
             "cloth",
@@ -100,7 +101,6 @@ const ONLY: &[(&str, &[&str])] = &[
     ("indicatif", &["studio"]),
     ("axum", &["service"]),
     ("hyper", &["service"]),
-    ("rusqlite", &["service"]),
     ("anyhow", &["studio"]),
     ("tracing-subscriber", &["studio"]),
     ("rusb", &["driver-transport"]),
@@ -108,7 +108,7 @@ const ONLY: &[(&str, &[&str])] = &[
     ("nokhwa", &["driver-webcam"]),
     ("mcap", &["capture"]),
     ("gltf-json", &["avatar"]),
-    ("rusqlite", &["archive"]),
+    ("rusqlite", &["archive", "service"]),
 ];
 
 /// Words that must not stand in a crate's source: crate, words, and which promise of ARCHITECTURE.md that keeps.
