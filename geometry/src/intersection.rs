@@ -46,19 +46,6 @@ pub fn crossings(a: &Mesh, bvh_a: &Bvh, b: &Mesh, bvh_b: &Bvh) -> Vec<[u32; 2]> 
     bvh_a.pairs_with(bvh_b, |t, u| triangles_cross(&a.corners(t as usize), &b.corners(u as usize)))
 }
 
-/// As [`crossings`], for some of `a`'s triangles.
-pub fn crossings_among(a: &Mesh, some: &[u32], b: &Mesh, bvh_b: &Bvh) -> Vec<[u32; 2]> {
-    let of = |t: u32, found: &mut Vec<[u32; 2]>| {
-        let x = a.corners(t as usize);
-        visit_sorted(bvh_b, &x, |u| {
-            if triangles_cross(&x, &b.corners(u as usize)) {
-                found.push([t, u]);
-            }
-        });
-    };
-    collect(some, of)
-}
-
 /// All pairs of triangles of one mesh that cross, ascending. Pairs that share an edge are skipped; of pairs that share
 /// a vertex the opposite edges are tested.
 pub fn self_crossings(mesh: &Mesh, bvh: &Bvh) -> Vec<[u32; 2]> {

@@ -17,7 +17,7 @@ const STEPS: (usize, usize) = (2, 6);
 const DRAG: f64 = 7.0;
 /// Deceleration by the cloth's own friction, m/s²: a twentieth of gravity, assumed.
 const DRY: f64 = 0.5;
-/// Time in which corrections fade, seconds: a step and a half of a walk.
+/// Time in which corrections fade, seconds: less than a step of a walk, so that no phase of it carries those of the others. Chosen by trying.
 const FORGET: f64 = 0.4;
 
 /// An outfit in motion: give it pose after pose.
