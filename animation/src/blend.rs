@@ -21,6 +21,7 @@ mod proxy;
 mod ride;
 mod room;
 mod squeeze;
+mod strain;
 mod wearer;
 
 pub use layer::OutfitLayer;

@@ -5,7 +5,13 @@ use rayon::prelude::*;
 use toile_character::{Joint, Pose, Skeleton, SkinWeights, Skinner, skin::INFLUENCES};
 use toile_geometry::Mesh;
 
-use super::{anchors::Closeness, layer::OutfitLayer, proxy::Proxy, squeeze::Columns};
+use super::{
+    anchors::Closeness,
+    layer::OutfitLayer,
+    proxy::Proxy,
+    squeeze::Columns,
+    strain::{CLOTH, SKIN, StrainLimit},
+};
 use crate::AnimationError;
 
 /// A body and its garments, inside to outside, in the pose in which they were scanned.
@@ -17,6 +23,8 @@ pub struct Outfit {
     /// One for each garment.
     pub(super) proxies: Vec<Proxy>,
     pub(super) columns: Columns,
+    /// One for each layer.
+    pub(super) limits: Vec<StrainLimit>,
 }
 
 impl Outfit {
@@ -38,7 +46,12 @@ impl Outfit {
             layers[1..].par_iter().map(|layer| Proxy::new(layer, &closeness)).collect();
         let meshes: Vec<&Mesh> = layers.iter().map(|l| &l.mesh).collect();
         let columns = Columns::new(&meshes, hands_and_feet(&body.weights), &closeness);
-        Ok(Self { skeleton, pose0, proxies: proxies?, columns, skinners, layers })
+        let limits = meshes
+            .par_iter()
+            .enumerate()
+            .map(|(k, mesh)| StrainLimit::new(mesh, if k == 0 { SKIN } else { CLOTH }))
+            .collect();
+        Ok(Self { limits, skeleton, pose0, proxies: proxies?, columns, skinners, layers })
     }
 
     /// The layers in the outfit's first pose.

@@ -54,7 +54,7 @@ pub(crate) struct Pressed {
     step: Vec<f32>,
     /// What is left of the height beside that, at most 1.
     share: Vec<f32>,
-    normals: Vec<Vector3<f32>>,
+    pub normals: Vec<Vector3<f32>>,
 }
 
 impl Columns {

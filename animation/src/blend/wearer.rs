@@ -113,6 +113,7 @@ impl<'a> Wearer<'a> {
         let skin = self.layers[0].clone();
         let pressed = self.pressed.get_or_insert_with(|| outfit.columns.press(&skin));
         pressed.apply_to_body(&mut self.layers[0]);
+        outfit.limits[0].apply(&mut self.layers[0], Some(&pressed.normals));
         for (k, proxy) in outfit.proxies.iter().enumerate() {
             let fine = &mut self.layers[k + 1];
             outfit.columns.apply(pressed, &skin, k, fine);
@@ -126,6 +127,7 @@ impl<'a> Wearer<'a> {
                 *c *= kept;
                 *p += turn * *c;
             });
+            outfit.limits[k + 1].apply(fine, None);
         }
     }
 
