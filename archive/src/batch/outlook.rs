@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use toile_pipeline::{Options, Plan, Standing, plan};
 
-use super::quarantine::Quarantine;
+use super::{quarantine::Quarantine, task::memory_of};
 use crate::{ArchiveError, find::subjects, keep::forgotten};
 
 /// Which subjects are meant.
@@ -88,6 +88,35 @@ impl Outlook {
     pub fn seconds(&self) -> f64 {
         self.due().fold(0.0, |sum, (_, plan)| sum + plan.seconds)
     }
+
+    /// Expected seconds of all that is due with so many `workers` side by side and so much `memory`, bytes, and the most that will be
+    /// under way at once.
+    pub fn side_by_side(&self, workers: usize, memory: u64) -> (f64, usize) {
+        let seen = self.prospects.iter().filter_map(|p| p.plan.as_ref()?.peak_memory_bytes).max();
+        let jobs = self.due().map(|(_, plan)| (plan.seconds, memory_of(plan.peak_memory_bytes, seen)));
+        schedule(jobs.collect(), workers, memory)
+    }
+}
+
+/// When the last of the `jobs` (seconds, bytes) ends if the longest that fits begins whenever there is room, and the most at once. What
+/// fits nowhere runs alone.
+fn schedule(mut jobs: Vec<(f64, u64)>, workers: usize, memory: u64) -> (f64, usize) {
+    jobs.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (mut now, mut most, mut running) = (0.0, 0, Vec::<(f64, u64)>::new());
+    while !jobs.is_empty() || !running.is_empty() {
+        let kept: u64 = running.iter().map(|r| r.1).sum();
+        let room = |job: &(f64, u64)| running.is_empty() || kept + job.1 <= memory;
+        let next = jobs.iter().position(room).filter(|_| running.len() < workers.max(1));
+        if let Some(at) = next {
+            let (seconds, bytes) = jobs.remove(at);
+            running.push((now + seconds, bytes));
+            most = most.max(running.len());
+            continue;
+        }
+        running.sort_by(|a, b| a.0.total_cmp(&b.0));
+        now = running.remove(0).0;
+    }
+    (now, most)
 }
 
 /// One subject as a batch would treat it.
@@ -118,4 +147,20 @@ fn left_out(plan: &Plan, choice: &Choice) -> Option<String> {
     let stage = choice.stage.as_ref()?;
     let has = plan.steps.iter().any(|step| step.rsplit('/').next() == Some(stage));
     (!has).then(|| format!("its step {stage} does not have to run"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_limits_what_runs_side_by_side() {
+        let jobs = vec![(10.0, 300), (10.0, 300), (10.0, 300), (10.0, 900)];
+        assert_eq!(schedule(jobs.clone(), 2, 10_000), (20.0, 2));
+        assert_eq!(schedule(jobs.clone(), 4, 10_000), (10.0, 4));
+        // The one of 900 has no other beside it, and runs though it is too large.
+        assert_eq!(schedule(jobs.clone(), 4, 700), (30.0, 2));
+        assert_eq!(schedule(jobs, 4, 100), (40.0, 1));
+        assert_eq!(schedule(Vec::new(), 4, 100), (0.0, 0));
+    }
 }

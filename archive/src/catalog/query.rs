@@ -114,6 +114,10 @@ fn ask(connection: &Connection, sql: &str, since: &str) -> rusqlite::Result<Tabl
     })?;
     let mut statement = connection.prepare(sql)?;
     let columns: Vec<String> = statement.column_names().map(String::from).collect();
+    // What answers no columns is no question: ATTACH and VACUUM INTO would create files.
+    if columns.is_empty() {
+        return Err(rusqlite::Error::InvalidQuery);
+    }
     if let Some(at) = statement.parameter_index(":since")? {
         statement.raw_bind_parameter(at, since)?;
     }

@@ -66,12 +66,14 @@ impl<'a> Texturing<'a> {
     }
 
     /// The pictures of all frames whose place is known.
-    fn photos(&self) -> Result<Vec<Photo>, PipelineError> {
+    fn photos(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Vec<Photo>, PipelineError> {
         let Opened { mut source, .. } = Opened::new(&self.run.folders.take(&self.layer), None)?;
         let places = self.places(source.as_ref())?;
         let sensors = source.rig().sensors.clone();
         let mut photos = Vec::new();
+        let frames = places.iter().map(Vec::len).sum::<usize>().max(1);
         loop {
+            progress(0.1 * (photos.len() as f32 / frames as f32).min(1.0));
             let frame = match source.next_frame() {
                 Ok(Some(frame)) => frame,
                 Ok(None) => return Ok(photos),
@@ -150,11 +152,12 @@ impl Step for Texturing<'_> {
         let path = self.run.folders.take(&self.layer);
         let wrong = |e| PipelineError::stage(&path, e);
         let scan = ply::read(&self.run.folders.scan(&self.layer))?;
-        let photos = self.photos()?;
+        let photos = self.photos(progress)?;
         let settings = TextureSettings {
             size: fitting_size(&scan, &photos, &self.run.settings.texture),
             ..self.run.settings.texture.clone()
         };
+        progress(0.12);
         let atlas = unwrap(&scan, &settings).map_err(wrong)?;
         progress(0.15);
         let texture = bake(&scan, &atlas, &photos, &settings, &|at| progress(0.15 + 0.75 * at)).map_err(wrong)?;

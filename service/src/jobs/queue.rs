@@ -296,7 +296,12 @@ impl Shared {
         hearing.say(&format!("{:?} of {}, attempt {}", job.kind, job.subject, job.attempt));
         let done = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(job.kind, &root, &job.options, &hearing))));
         let ended = Ended::of(done, &root);
-        hearing.say(&ended.sentence());
+        let is_put_off = matches!(ended, Ended::Cancelled) && self.queue().ends;
+        hearing.say(&if is_put_off {
+            "the service ends; the job goes on when it is back".into()
+        } else {
+            ended.sentence()
+        });
         ended
     }
 

@@ -16,13 +16,14 @@ pub(super) fn outlook(outlook: &Outlook, limits: &Limits) -> Result<Answer, Stud
     let rows: Vec<[String; 4]> = outlook.prospects.iter().filter(|p| is_told(p)).map(row).collect();
     let mut text = table_of(&["subject", "standing", "about", "why"], &rows);
     let seconds = outlook.seconds();
+    let (elapsed, at_once) = outlook.side_by_side(limits.workers, limits.memory.bytes);
     let guessed = outlook.due().filter(|(_, plan)| plan.guessed).count();
     text.push_str(&counts(outlook));
     text.push_str(&format!(
-        "{} of work: {} with {} side by side ({} MiB of memory, by {}){}\n",
+        "{} of work: {} with at most {} side by side ({} MiB of memory, by {}){}\n",
         duration(seconds),
-        duration(seconds / limits.workers as f64),
-        limits.workers,
+        duration(elapsed),
+        at_once,
         limits.memory.bytes >> 20,
         limits.memory.by,
         if guessed > 0 {
@@ -36,6 +37,8 @@ pub(super) fn outlook(outlook: &Outlook, limits: &Limits) -> Result<Answer, Stud
         "due": outlook.due().count(),
         "up_to_date": outlook.count(Standing::UpToDate),
         "seconds": seconds,
+        "elapsed_seconds": elapsed,
+        "most_at_once": at_once,
         "limits": { "workers": limits.workers, "memory_bytes": limits.memory.bytes, "memory_by": limits.memory.by },
     });
     Ok(Answer { text, results, failures: broken(outlook), ..Answer::default() })
