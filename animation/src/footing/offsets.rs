@@ -6,6 +6,10 @@ use super::{smooth::averaged, stances::Stances, track::Track};
 
 /// Farthest that a foot is moved along the floor, metres: a file whose feet slide further in one stance, as on ice, slides on.
 const MOST: f64 = 0.08;
+/// Two stances this near to each other, seconds, hold each other's displacement as much as a stance of that length holds its own.
+const SHORT: f64 = 0.2;
+/// Sweeps of the solution by Gauss and Seidel: a pull goes over as many stances.
+const SWEEPS: usize = 40;
 /// Seconds in which the speed that a foot leaves the floor with, or comes to it with, is blended.
 const BLEND: f64 = 0.25;
 /// Seconds of a stance over which that speed is taken.
@@ -18,9 +22,10 @@ const ROUND: f64 = 0.017;
 pub(super) fn of(track: &Track, stances: &Stances, frame_time: f64) -> Vec<Vector3<f64>> {
     let count = track.heights.len();
     let mut offsets = vec![Vector3::zeros(); count];
-    for stance in &stances.0 {
-        let held = held(track, stance.clone());
-        offsets[stance.clone()].copy_from_slice(&held);
+    let mut all: Vec<Vec<Vector3<f64>>> = stances.0.iter().map(|stance| held(track, stance.clone())).collect();
+    bring_together(&mut all, stances, frame_time);
+    for (stance, held) in stances.0.iter().zip(&all) {
+        offsets[stance.clone()].copy_from_slice(held);
     }
     let blend = (BLEND / frame_time).round().max(1.0);
     let over = (SLOPE / frame_time).round().max(1.0) as usize;
@@ -56,6 +61,34 @@ fn held(track: &Track, stance: std::ops::Range<usize>) -> Vec<Vector3<f64>> {
     let share = if furthest > MOST { MOST / furthest } else { 1.0 };
     let place = |(o, height): (&Vector3<f64>, &f64)| (o - middle) * share - Vector3::y() * *height;
     held.iter().zip(&track.heights[stance]).map(place).collect()
+}
+
+/// Shifts whole stances along the floor so that those with little time between them are displaced alike: least squares of the shifts, by
+/// the stances' seconds, and of the changes in the gaps.
+fn bring_together(all: &mut [Vec<Vector3<f64>>], stances: &Stances, frame_time: f64) {
+    let ends: Vec<(Vector3<f64>, Vector3<f64>)> = all.iter().filter_map(|h| Some((*h.first()?, *h.last()?))).collect();
+    let pull = |i: usize| {
+        let gap = (stances.0[i + 1].start + 1 - stances.0[i].end) as f64 * frame_time;
+        SHORT * (SHORT / gap).powi(2)
+    };
+    let mut shifts = vec![Vector3::zeros(); all.len()];
+    for _ in 0..SWEEPS {
+        for i in 0..all.len() {
+            let (mut sum, mut weights) = (Vector3::zeros(), all[i].len() as f64 * frame_time);
+            if i > 0 {
+                sum += (shifts[i - 1] + ends[i - 1].1 - ends[i].0) * pull(i - 1);
+                weights += pull(i - 1);
+            }
+            if i + 1 < all.len() {
+                sum += (shifts[i + 1] + ends[i + 1].0 - ends[i].1) * pull(i);
+                weights += pull(i);
+            }
+            shifts[i] = Vector3::new(sum.x, 0.0, sum.z) / weights;
+        }
+    }
+    for (held, shift) in all.iter_mut().zip(shifts) {
+        held.iter_mut().for_each(|o| *o += shift);
+    }
 }
 
 /// The last pose of each stance with the first of the next; `None` at the ends of the motion.

@@ -18,7 +18,7 @@ const ROLLS: f64 = 0.025;
 const WINDOW: f64 = 1.0 / 30.0;
 /// Shorter gaps, seconds, in which the foot stays within [`GAP_WAY`] metres, are no gaps.
 const GAP: f64 = 0.08;
-const GAP_WAY: f64 = 0.04;
+const GAP_WAY: f64 = 0.06;
 /// Shorter stances, seconds, are none.
 const SHORTEST: f64 = 0.03;
 

@@ -9,7 +9,7 @@ use toile_geometry::statistics::{Rank, median, quantile_by};
 pub(super) fn place(soles: &Soles, poses: &mut [Pose]) {
     const FIXED_HEIGHT: f64 = 1e-4; // metres
     let target = soles.skeleton();
-    let heights: Vec<f64> = poses.iter().map(|p| soles.height(p)).collect();
+    let heights: Vec<f64> = poses.iter().map(|p| lowest_foot(soles, p).1).collect();
     let hips = |p: &Pose| target.position(Joint::Hips).y + p.translation.y;
     let (low, high) = poses.iter().map(hips).fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
     let start = poses.first().map_or_else(Vector3::zeros, |p| p.translation + target.position(Joint::Hips).coords);
@@ -57,8 +57,8 @@ pub(super) fn depth_below_floor(soles: &Soles, poses: &[Pose]) -> f64 {
     quantile_by(&mut heights, 0.02, Rank::Count).map_or(0.0, |h| (-h).max(0.0))
 }
 
-/// The lower foot and the height of its sole above the floor.
+/// The lower foot and the height of its sole above the floor, its toes bent as the floor would bend them.
 fn lowest_foot(soles: &Soles, pose: &Pose) -> (Joint, f64) {
-    let [left, right] = soles.feet().each_ref().map(|sole| (sole.leg.foot, soles.height_of(sole, pose)));
+    let [left, right] = soles.feet().each_ref().map(|sole| (sole.leg.foot, soles.roll(sole, &mut pose.clone())));
     if left.1 <= right.1 { left } else { right }
 }
