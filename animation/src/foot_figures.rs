@@ -24,6 +24,8 @@ const RATHER_LOW: f64 = 0.08;
 const STANDS: f64 = 0.015;
 /// Skin of a foot this near to its lowest point touches the floor, metres.
 const TOUCHES: f64 = 0.005;
+/// Skin on the floor slides from here on, metres a step.
+const SLIDES: f64 = 0.005;
 /// A joint is beyond its limit from here on, radians.
 const BEYOND: f64 = 0.09;
 
@@ -38,6 +40,8 @@ pub struct FootFigures {
     pub slide_p95: f64,
     /// and at most.
     pub slide_most: f64,
+    /// Such steps in which it moves by more than 5 mm.
+    pub sliding: usize,
     /// How deep the body's lowest vertex is below the floor in the worst pose; negative above it.
     pub deepest: f64,
     /// Steps in which a foot stands in the file, and the person's is above the floor by more than 15 mm.
@@ -81,6 +85,7 @@ pub fn foot_figures(bvh: &Bvh, moved: &Retargeted, body: &SkinnedMesh) -> Result
         }
     }
     figures.standing = slides.len();
+    figures.sliding = slides.iter().filter(|slide| **slide > SLIDES).count();
     figures.slide_mean = slides.iter().sum::<f64>() / slides.len().max(1) as f64;
     figures.slide_p95 = quantile_by(&mut slides, 0.95, Rank::Count).unwrap_or(0.0);
     figures.slide_most = slides.iter().copied().fold(0.0, f64::max);

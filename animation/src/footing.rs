@@ -42,6 +42,9 @@ pub struct Footing {
 /// Makes the feet of `motion` stand on the floor, y = 0, and keeps `body`, where there is one, above it.
 pub(crate) fn stand(soles: &Soles, body: Option<&SkinnedMesh>, motion: &mut Motion) -> Footing {
     let step = motion.frame_time;
+    if let Some(body) = body {
+        body::put_on_floor(body, &mut motion.poses);
+    }
     let tracks = soles.feet().each_ref().map(|sole| Track::of(soles, sole, &motion.poses));
     let stances = tracks.each_ref().map(|track| Stances::of(track, step));
     let offsets = [0, 1].map(|foot: usize| offsets::of(&tracks[foot], &stances[foot], step));

@@ -32,6 +32,9 @@ use calibration_pose::calibration_frames;
 use constants::Constants;
 use reference::find_reference;
 
+/// Metres by which the whole body is lifted out of the floor before that is said: more than skin gives.
+const NOTICED: f64 = 0.02;
+
 /// How a motion is carried over.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -170,12 +173,12 @@ fn on_soles(
         foot_below_floor: ground::depth_below_floor(soles, &motion.poses),
         footing,
         room: Room::default(),
-        warnings: warnings(bvh, first),
+        warnings: warnings(bvh, first, &footing),
     };
     Ok(Retargeted { motion, report })
 }
 
-fn warnings(bvh: &Bvh, first: usize) -> Vec<String> {
+fn warnings(bvh: &Bvh, first: usize, footing: &Footing) -> Vec<String> {
     let dropped = match first {
         0 => None,
         1 => Some("its first frame is a pose for calibration and was left out".to_string()),
@@ -183,7 +186,11 @@ fn warnings(bvh: &Bvh, first: usize) -> Vec<String> {
             "its first {first} frames are a pose for calibration that fades into the motion and were left out"
         )),
     };
-    bvh.warnings.iter().cloned().chain(dropped).collect()
+    let lifted = (footing.body_most > NOTICED).then(|| {
+        let mm = 1e3 * footing.body_most;
+        format!("up to {mm:.0} mm of the body would be below the floor; it was lifted as a whole there")
+    });
+    bvh.warnings.iter().cloned().chain(dropped).chain(lifted).collect()
 }
 
 /// The poses of all frames from `first` on, hips not yet on the floor.

@@ -329,7 +329,9 @@ fn feet_of_real_captures_stand_on_the_floor_and_do_not_slide() {
             foot_figures(&bvh, &moved, &body).unwrap()
         };
         let held = figures(true);
-        assert!(held.slide_most < 0.005, "{name}: skin on the floor slides {} m in a step", held.slide_most);
+        // of a wild dance one step in 500 may slide: a foot that is dragged through the air slows down
+        assert!(held.sliding * 500 <= held.standing, "{name}: skin on the floor slides: {held:?}");
+        assert!(held.slide_p95 < 0.003, "{name}: {held:?}");
         assert!(held.deepest < 0.002, "{name}: {} m below the floor", held.deepest);
         assert!(held.floating * 50 <= held.standing, "{name}: {held:?}");
         if bvh.frames.len() < 200 {
@@ -338,6 +340,35 @@ fn feet_of_real_captures_stand_on_the_floor_and_do_not_slide() {
             // a foot that stops has to be stopped: no more than that
             assert!(held.acceleration_p99 < free.acceleration_p99 + 35.0, "{name}: {held:?} {free:?}");
         }
+    }
+}
+
+/// Somebody who walks and then goes down on the back, or over onto the hands: nothing of the body is below the floor, and it does
+/// not shake.
+#[test]
+fn who_lies_down_or_turns_over_is_not_in_the_floor() {
+    let body = BodyModel::load_default().unwrap().skinned(&[]);
+    let walk = shipped_walk().unwrap();
+    let settings = RetargetSettings { max_rate: 15.0, ..RetargetSettings::default() };
+    for turn in [Vector3::x() * -1.5, Vector3::z() * 3.1] {
+        let mut turned = walk.clone();
+        for frame in 0..walk.frames.len() {
+            let share = (3.0 * frame as f64 / walk.frames.len() as f64 - 2.0).clamp(0.0, 1.0);
+            let turn = UnitQuaternion::from_scaled_axis(turn * share * share * (3.0 - 2.0 * share));
+            let one = Bvh { frames: vec![walk.frames[frame].clone()], ..walk.clone() };
+            let of = |joint: usize, local| if joint == 0 { turn * local } else { local };
+            turned.frames[frame] =
+                rebuilt(&one, |_, offset| offset, of, |at| at - Vector3::y() * 80.0 * share).frames[0].clone();
+        }
+        turned.joints = rebuilt(&walk, |_, o| o, |_, l| l, |p| p).joints;
+        let figures = |lift_feet: bool| {
+            let settings = RetargetSettings { lift_feet, ..settings.clone() };
+            let moved = retarget_body(&turned, "turned", &body, &settings).unwrap();
+            foot_figures(&turned, &moved, &body).unwrap()
+        };
+        let (held, free) = (figures(true), figures(false));
+        assert!(free.deepest > 0.1 && held.deepest < 0.002, "{turn}: {held:?}, {free:?}");
+        assert!(held.acceleration_p99 < free.acceleration_p99 + 20.0, "{turn}: {held:?}, {free:?}");
     }
 }
 

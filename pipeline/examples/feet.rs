@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let body = Body::load(&Folders::new(Path::new(subject)), "00-body", &BodyModel::load_default()?)?;
     println!(
-        "{:28} {:>5} {:>5} | slide mm a step: mean  p95  most | deepest mm | floats | limits | m/s² | first",
+        "{:33} {:>5} {:>5} | slide mm a step: mean  p95  most   > 5 | deepest mm | floats | limits | m/s² | first",
         "motion", "Hz", "steps"
     );
     for motion in motions {
@@ -52,13 +52,14 @@ fn line(path: &Path, body: &Body, settings: &RetargetSettings) -> Result<(), Box
     let figures = foot_figures(&motion::source(file)?.0, &moved, &body.skinned)?;
     let mm = 1e3;
     println!(
-        "{:28} {:5.0} {:5} | {:21.2} {:5.2} {:5.2} | {:10.1} | {:6} | {:6} | {:4.0} | {:.1}",
+        "{:33} {:5.0} {:5} | {:21.2} {:5.2} {:5.2} {:5} | {:10.1} | {:6} | {:6} | {:4.0} | {:.1}",
         moved.motion.name,
         1.0 / moved.motion.frame_time,
         figures.standing,
         figures.slide_mean * mm,
         figures.slide_p95 * mm,
         figures.slide_most * mm,
+        figures.sliding,
         figures.deepest * mm,
         figures.floating,
         figures.beyond_limits,

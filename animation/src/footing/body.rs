@@ -3,13 +3,27 @@
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use toile_character::{Motion, Pose, SkinnedMesh, soles::Soles};
+use toile_geometry::statistics::{Rank, median, quantile_by};
 
 use super::{smooth::envelope, stances::Stances};
 
 /// Less than this below the floor is left there, metres: skin gives by more.
 const LEFT: f64 = 0.001;
+/// Deeper than this in half of all poses is no fault of feet, metres.
+const DEEP: f64 = 0.05;
 /// Seconds to either side in which the whole goes up for something that comes into the floor.
 const RISES: f64 = 0.2;
+
+/// Where most of a motion is deep in the floor, nobody stands on feet: someone lies, swims or stands on the hands. Then the floor is where
+/// the body's lowest points are.
+pub(super) fn put_on_floor(body: &SkinnedMesh, poses: &mut [Pose]) {
+    let mut depths = depths(body, poses);
+    if median(&mut depths).is_none_or(|depth| depth < DEEP) {
+        return;
+    }
+    let up = quantile_by(&mut depths, 0.98, Rank::Count).unwrap_or(0.0);
+    poses.iter_mut().for_each(|pose| pose.translation.y += up);
+}
 
 /// Lifts the whole, smoothly, by the least that keeps the lowest vertex of `body` on the floor; feet that stand stay where they
 /// are. Gives the farthest that it was lifted, metres.
@@ -25,7 +39,8 @@ pub(super) fn lift(soles: &Soles, body: &SkinnedMesh, motion: &mut Motion, stanc
     for (k, pose) in motion.poses.iter_mut().enumerate() {
         pose.translation.y += up[k];
         most = f64::max(most, up[k]);
-        for (_, sole) in soles.feet().iter().enumerate().filter(|(foot, _)| masks[*foot][k] && up[k] > 0.0) {
+        let standing = soles.feet().iter().zip(&masks).filter(|(_, mask)| mask[k] && up[k] > 0.0);
+        for (sole, _) in standing {
             let by = -soles.height_of(sole, pose);
             sole.leg.move_ankle(soles.skeleton(), pose, &(Vector3::y() * by));
         }

@@ -27,10 +27,10 @@ pub(super) fn shift(
     offsets: &[Vec<Vector3<f64>>; 2],
     frame_time: f64,
 ) -> Vec<f64> {
-    let reach = |seconds: f64| (seconds / frame_time).round().max(1.0) as usize;
+    let poses_in = |seconds: f64| (seconds / frame_time).round().max(1.0) as usize;
     let masks = stances.each_ref().map(|s| s.mask(poses.len()));
     let followed = follow(&masks, offsets);
-    let follows = reach(FOLLOWS);
+    let follows = poses_in(FOLLOWS);
     let followed = averaged(&averaged(&followed, follows), follows);
     let short = |pose: usize| {
         let at = poses[pose].joint_positions(soles.skeleton());
@@ -41,7 +41,7 @@ pub(super) fn shift(
         of(0).max(of(1))
     };
     let short: Vec<f64> = (0..poses.len()).map(short).collect();
-    followed.iter().zip(envelope(&short, reach(REACHES))).map(|(up, down)| up - down).collect()
+    followed.iter().zip(envelope(&short, poses_in(REACHES))).map(|(up, down)| up - down).collect()
 }
 
 /// The mean height that standing feet are moved by, between stances on a line.
@@ -64,12 +64,17 @@ fn follow(masks: &[Vec<bool>; 2], offsets: &[Vec<Vector3<f64>>; 2]) -> Vec<f64> 
     out
 }
 
+/// How far from the hip an ankle may be set, metres, on a leg of this length that the file has `distance` long.
+pub(super) fn reach(length: f64, distance: f64) -> f64 {
+    distance.clamp(STRAIGHT.0 * length, STRAIGHT.1 * length)
+}
+
 /// How far the hips must go down so that the leg of `sole` reaches its foot, when they are `up` already.
 fn missing(soles: &Soles, sole: &Sole, at: &[Point3<f64>], offset: &Vector3<f64>, up: f64) -> f64 {
     let of = |joint: Joint| at[joint.index()];
     let (hip, ankle) = (of(sole.leg.upper), of(sole.leg.foot));
     let length = sole.leg.length(soles.skeleton());
-    let limit = (ankle - hip).norm().clamp(STRAIGHT.0 * length, STRAIGHT.1 * length);
+    let limit = reach(length, (ankle - hip).norm());
     let way = ankle + offset - (hip + Vector3::y() * up);
     let level = way.x.hypot(way.z);
     if way.norm() <= limit || level >= limit {

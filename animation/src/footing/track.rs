@@ -7,8 +7,8 @@ use toile_character::{
     soles::{Sole, Soles},
 };
 
-/// Skin within about this height over the lowest touches the floor, metres: the heel's pad gives by 5 to 9 mm under a
-/// standing person's weight (Uzel et al. 2006, heel pad thickness and compressibility).
+/// Skin within about this height over the lowest touches the floor, metres: the pad of the heel gives by several millimetres under the
+/// weight of somebody who stands.
 const PAD: f64 = 0.005;
 /// Less than this from pose to pose is no motion, metres.
 const STILL: f64 = 2e-4;
