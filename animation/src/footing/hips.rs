@@ -34,9 +34,9 @@ pub(super) fn shift(
     let followed = averaged(&averaged(&followed, follows), follows);
     let short = |pose: usize| {
         let at = poses[pose].joint_positions(soles.skeleton());
-        let of = |foot: usize| match masks[foot][pose] {
-            true => missing(soles, &soles.feet()[foot], &at, &offsets[foot][pose], followed[pose]),
-            false => 0.0,
+        let of = |foot: usize| {
+            let short = || missing(soles, &soles.feet()[foot], &at, &offsets[foot][pose], followed[pose]);
+            if masks[foot][pose] { short() } else { 0.0 }
         };
         of(0).max(of(1))
     };
@@ -57,8 +57,8 @@ fn follow(masks: &[Vec<bool>; 2], offsets: &[Vec<Vector3<f64>>; 2]) -> Vec<f64> 
     out[last.0..].fill(last.1);
     for pair in known.windows(2) {
         let ((from, low), (to, high)) = (pair[0], pair[1]);
-        for pose in from..to {
-            out[pose] = low + (high - low) * (pose - from) as f64 / (to - from) as f64;
+        for (k, value) in out[from..to].iter_mut().enumerate() {
+            *value = low + (high - low) * k as f64 / (to - from) as f64;
         }
     }
     out

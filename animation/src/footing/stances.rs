@@ -29,7 +29,7 @@ impl Stances {
     /// Finds them in a motion of `frame_time` seconds a pose.
     pub fn of(track: &Track, frame_time: f64) -> Self {
         if track.heights.len() == 1 {
-            return Self(if track.heights[0] < LOW { vec![0..1] } else { Vec::new() });
+            return Self(std::iter::once(0..1).filter(|_| track.heights[0] < LOW).collect());
         }
         let speeds = speeds(track, frame_time);
         let mut steps: Vec<Range<usize>> = Vec::new();
