@@ -2,6 +2,7 @@
 //!
 //! A motion is a file, a folder of files, or `walk`. Each is carried onto the subject's fitted body and measured on the
 //! body's surface, at the motion's own rate and at 30 poses a second. `--raw` leaves feet as the file has them.
+#![allow(clippy::print_stdout)] // printing is what it does
 
 use std::{
     env,
