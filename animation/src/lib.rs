@@ -5,6 +5,7 @@
 //! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
 //! - [`blend`]: the layers of an outfit in motion, by skinning and by cloth;
 //! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
+//! - [`foot_figures`]: how well the feet of a motion stand, measured on the body's surface;
 //! - [`resample`], [`close_loop`]: other rates, endless motions.
 //!
 //! ```
@@ -24,11 +25,15 @@ pub mod blend;
 pub mod bvh;
 pub mod decomposition;
 mod error;
+mod foot_figures;
+mod footing;
 mod retarget;
 mod skeleton;
 mod walk;
 
 pub use bvh::Bvh;
 pub use error::AnimationError;
-pub use retarget::{RetargetReport, RetargetSettings, Retargeted, close_loop, resample, retarget};
+pub use foot_figures::{FootFigures, foot_figures};
+pub use footing::Footing;
+pub use retarget::{RetargetReport, RetargetSettings, Retargeted, close_loop, resample, retarget, retarget_body};
 pub use walk::{SHIPPED_WALK, WalkSettings, shipped_walk, walk};

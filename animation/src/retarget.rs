@@ -1,7 +1,7 @@
 //! A motion file carried onto the skeleton of one person.
 //!
-//! Limbs of the result point where the source's limbs point, in every frame and exactly unless a foot has to be lifted
-//! out of the floor; twist comes from the source's joints; trunk and head turn as the source's do. The hips go the
+//! Limbs of the result point where the source's limbs point, in every frame and exactly, but for what makes feet stand and
+//! keeps the body out of the floor; twist comes from the source's joints; trunk and head turn as the source's do. The hips go the
 //! source's way scaled by leg length, so that feet land instead of sliding, and the whole is set on the floor facing +Z.
 
 mod calibration_pose;
@@ -16,7 +16,7 @@ mod resample;
 mod turns;
 
 use serde::{Deserialize, Serialize};
-use toile_character::{Joint, Motion, Pose, Skeleton, feet::lift_out_of_floor};
+use toile_character::{Joint, Motion, Pose, Skeleton, SkinnedMesh, soles::Soles};
 
 pub use looping::close_loop;
 pub use resample::resample;
@@ -25,11 +25,15 @@ use crate::{
     AnimationError, Bvh,
     blend::Room,
     bvh::FRAME_TIMES,
+    footing::{Footing, stand},
     skeleton::{Source, recognise},
 };
-use calibration_pose::starts_with_calibration;
+use calibration_pose::calibration_frames;
 use constants::Constants;
 use reference::find_reference;
+
+/// Metres by which the whole body is lifted out of the floor before that is said: more than skin gives.
+const NOTICED: f64 = 0.02;
 
 /// How a motion is carried over.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,7 +49,8 @@ pub struct RetargetSettings {
     pub looped: bool,
     /// Turn finger joints where the source has them. Default true.
     pub fingers: bool,
-    /// Lift feet that would dip below the floor, by bending the knee. Default true.
+    /// Hold feet that stand in their place on the floor, and lift what would dip below it, by bending knees and moving the hips
+    /// up and down. Default true.
     pub lift_feet: bool,
     /// Hold arms as far from the body as the clothes between them need. Default true.
     pub room_for_clothes: bool,
@@ -85,12 +90,18 @@ pub struct RetargetReport {
     pub zero_pose_used: bool,
     /// True where the first frame was a calibration pose and was left out.
     pub first_frame_dropped: bool,
+    /// Frames at the start that were left out, because they are a calibration pose or lead out of one.
+    #[serde(default)]
+    pub frames_dropped: usize,
     /// Joints of the target with the file's joints that move them.
     pub joints: Vec<(Joint, String)>,
     /// Poses in the result.
     pub poses: usize,
     /// Depth of the lower foot's sole below the floor, 98th percentile over the poses, metres.
     pub foot_below_floor: f64,
+    /// How feet were made to stand, where that was done.
+    #[serde(default)]
+    pub footing: Footing,
     /// How far arms are held from the body to make room for clothes, where that was done.
     #[serde(default)]
     pub room: Room,
@@ -99,7 +110,8 @@ pub struct RetargetReport {
     pub warnings: Vec<String>,
 }
 
-/// Carries `bvh` onto the person whose rest is `target`; the result is called `name`.
+/// Carries `bvh` onto the person whose rest is `target`; the result is called `name`. Feet stand on the floor by a heel, a ball
+/// and toes that are guessed from the joints; [`retarget_body`] knows better.
 ///
 /// # Errors
 /// [`AnimationError::UnknownSkeleton`] where the joints are not a person's, [`AnimationError::Motion`] where one of
@@ -110,20 +122,43 @@ pub fn retarget(
     target: &Skeleton,
     settings: &RetargetSettings,
 ) -> Result<Retargeted, AnimationError> {
+    on_soles(bvh, name, &Soles::of_skeleton(target), None, settings)
+}
+
+/// Carries `bvh` onto `body`, which at rest stands on y = 0, and whose own skin stands on the floor and stays out of it; the
+/// result is called `name`.
+///
+/// # Errors
+/// As [`retarget`].
+pub fn retarget_body(
+    bvh: &Bvh,
+    name: &str,
+    body: &SkinnedMesh,
+    settings: &RetargetSettings,
+) -> Result<Retargeted, AnimationError> {
+    on_soles(bvh, name, &Soles::of_body(body), Some(body), settings)
+}
+
+fn on_soles(
+    bvh: &Bvh,
+    name: &str,
+    soles: &Soles,
+    body: Option<&SkinnedMesh>,
+    settings: &RetargetSettings,
+) -> Result<Retargeted, AnimationError> {
+    let target = soles.skeleton();
     check(bvh, target, settings)?;
     let source = recognise(bvh)?;
     let constants = find_reference(bvh, &source, target);
-    let first = usize::from(starts_with_calibration(bvh));
+    let first = calibration_frames(bvh);
     let metres_per_unit = placement::scale(bvh, &source, target)?;
-    let mut poses = carried(bvh, &source, &constants, target, first, metres_per_unit, settings);
-    ground::place(target, &mut poses);
-    if settings.lift_feet {
-        lift_out_of_floor(target, &mut poses);
-    }
-    if settings.in_place || settings.looped {
-        ground::keep_in_place(target, &mut poses, bvh.frame_time);
-    }
+    let poses = carried(bvh, &source, &constants, target, first, metres_per_unit, settings);
     let mut motion = resample(&Motion { name: name.into(), frame_time: bvh.frame_time, poses }, settings.max_rate);
+    ground::place(soles, &mut motion.poses);
+    let footing = if settings.lift_feet { stand(soles, body, &mut motion) } else { Footing::default() };
+    if settings.in_place || settings.looped {
+        ground::keep_in_place(target, &mut motion.poses, motion.frame_time);
+    }
     if settings.looped {
         motion = close_loop(&motion);
     }
@@ -131,14 +166,31 @@ pub fn retarget(
         metres_per_unit,
         up: constants.up.into(),
         zero_pose_used: constants.from_rest,
-        first_frame_dropped: first == 1,
+        first_frame_dropped: first > 0,
+        frames_dropped: first,
         joints: source.named(bvh),
         poses: motion.poses.len(),
-        foot_below_floor: ground::depth_below_floor(target, &motion.poses),
+        foot_below_floor: ground::depth_below_floor(soles, &motion.poses),
+        footing,
         room: Room::default(),
-        warnings: bvh.warnings.clone(),
+        warnings: warnings(bvh, first, &footing),
     };
     Ok(Retargeted { motion, report })
+}
+
+fn warnings(bvh: &Bvh, first: usize, footing: &Footing) -> Vec<String> {
+    let dropped = match first {
+        0 => None,
+        1 => Some("its first frame is a pose for calibration and was left out".to_string()),
+        _ => Some(format!(
+            "its first {first} frames are a pose for calibration that fades into the motion and were left out"
+        )),
+    };
+    let lifted = (footing.body_most > NOTICED).then(|| {
+        let mm = 1e3 * footing.body_most;
+        format!("up to {mm:.0} mm of the body would be below the floor; it was lifted as a whole there")
+    });
+    bvh.warnings.iter().cloned().chain(dropped).chain(lifted).collect()
 }
 
 /// The poses of all frames from `first` on, hips not yet on the floor.

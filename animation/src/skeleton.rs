@@ -1,6 +1,7 @@
 //! The joints of a motion file recognised: limbs by name, the trunk by structure.
 
 mod joint_names;
+mod prefix;
 mod source;
 mod tree;
 

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use toile_animation::{
     AnimationError, Bvh, RetargetSettings, Retargeted,
     bvh::{self, Channel},
-    retarget, shipped_walk,
+    foot_figures, retarget, retarget_body, shipped_walk,
 };
 use toile_character::{BodyModel, JOINT_COUNT, Joint, JointNaming, Pose, Skeleton};
 
@@ -298,7 +298,7 @@ fn limbs_of_real_captures_point_where_the_source_points() {
     for file in files {
         let bvh = bvh::read(&file).unwrap();
         let result = retarget(&bvh, "x", &person, &settings()).unwrap();
-        let first = usize::from(result.report.first_frame_dropped);
+        let first = result.report.frames_dropped;
         assert_eq!(result.motion.poses.len(), bvh.frames.len() - first);
         let step = bvh.frames.len().div_ceil(50);
         let rows: Vec<(usize, &Pose)> = result.motion.poses.iter().enumerate().step_by(step).collect();
@@ -319,44 +319,57 @@ fn limbs_of_real_captures_point_where_the_source_points() {
 #[test]
 fn feet_of_real_captures_stand_on_the_floor_and_do_not_slide() {
     let Some(files) = captures() else { return };
-    let person = person();
+    let body = BodyModel::load_default().unwrap().skinned(&[]);
     for file in files {
         let bvh = bvh::read(&file).unwrap();
-        let result = retarget(&bvh, "x", &person, &RetargetSettings { lift_feet: true, ..settings() }).unwrap();
         let name = file.file_stem().unwrap().to_string_lossy().to_string();
-        assert!(result.report.foot_below_floor < 1e-3, "{name}: {} m below", result.report.foot_below_floor);
-        let placed: Vec<_> = result.motion.poses.iter().map(|p| p.joint_positions(&person)).collect();
-        let height = |frame: usize, j: Joint| placed[frame][j.index()].y - person.position(j).y;
-        let lowest = |frame: usize| {
-            let feet = [Joint::LeftToes, Joint::RightToes, Joint::LeftFoot, Joint::RightFoot];
-            feet.map(|j| height(frame, j)).into_iter().fold(f64::MAX, f64::min)
+        let figures = |lift_feet: bool| {
+            let settings = RetargetSettings { lift_feet, ..RetargetSettings::default() };
+            let moved = retarget_body(&bvh, "x", &body, &settings).unwrap();
+            foot_figures(&bvh, &moved, &body).unwrap()
         };
-        let mut lows: Vec<f64> = (0..placed.len()).map(lowest).collect();
-        lows.sort_by(f64::total_cmp);
-        let (lowest, middle) = (lows[0], lows[lows.len() / 2]);
-        assert!(lowest > -0.005, "{name}: a foot joint {} m below where it rests", -lowest);
-        let airborne = name == "02_03" || name.contains("run"); // runners are in the air half of the time
-        assert!(airborne || middle < 0.02, "{name}: both feet are above {middle} m half of the time");
-        if name.contains("walk") && name != "walk1" || name.contains("131_01") || name == "05_01" {
-            let slide = sliding(&placed, &height, result.motion.frame_time);
-            assert!(slide < 0.15, "{name}: standing toes move at {slide} m/s");
+        let held = figures(true);
+        // of a wild dance one step in 500 may slide: a foot that is dragged through the air slows down
+        assert!(held.sliding * 500 <= held.standing, "{name}: skin on the floor slides: {held:?}");
+        assert!(held.slide_p95 < 0.003, "{name}: {held:?}");
+        assert!(held.deepest < 0.002, "{name}: {} m below the floor", held.deepest);
+        assert!(held.floating * 50 <= held.standing, "{name}: {held:?}");
+        if bvh.frames.len() < 200 {
+            let free = figures(false);
+            assert!(held.beyond_limits <= free.beyond_limits, "{name}: {held:?} where the file has {free:?}");
+            // a foot that stops has to be stopped: no more than that
+            assert!(held.acceleration_p99 < free.acceleration_p99 + 35.0, "{name}: {held:?} {free:?}");
         }
     }
 }
 
-/// Median speed over the ground of toes within 15 mm of the floor, metres a second.
-fn sliding(placed: &[Vec<nalgebra::Point3<f64>>], height: &impl Fn(usize, Joint) -> f64, step: f64) -> f64 {
-    let mut speeds: Vec<f64> = Vec::new();
-    for joint in [Joint::LeftToes, Joint::RightToes] {
-        for frame in 1..placed.len() {
-            if height(frame, joint) < 0.015 && height(frame - 1, joint) < 0.015 {
-                let moved = placed[frame][joint.index()] - placed[frame - 1][joint.index()];
-                speeds.push(moved.x.hypot(moved.z) / step);
-            }
+/// Somebody who walks and then goes down on the back, or over onto the hands: nothing of the body is below the floor, and it does
+/// not shake.
+#[test]
+fn who_lies_down_or_turns_over_is_not_in_the_floor() {
+    let body = BodyModel::load_default().unwrap().skinned(&[]);
+    let walk = shipped_walk().unwrap();
+    let settings = RetargetSettings { max_rate: 15.0, ..RetargetSettings::default() };
+    for turn in [Vector3::x() * -1.5, Vector3::z() * 3.1] {
+        let mut turned = walk.clone();
+        for frame in 0..walk.frames.len() {
+            let share = (3.0 * frame as f64 / walk.frames.len() as f64 - 2.0).clamp(0.0, 1.0);
+            let turn = UnitQuaternion::from_scaled_axis(turn * share * share * (3.0 - 2.0 * share));
+            let one = Bvh { frames: vec![walk.frames[frame].clone()], ..walk.clone() };
+            let of = |joint: usize, local| if joint == 0 { turn * local } else { local };
+            turned.frames[frame] =
+                rebuilt(&one, |_, offset| offset, of, |at| at - Vector3::y() * 80.0 * share).frames[0].clone();
         }
+        turned.joints = rebuilt(&walk, |_, o| o, |_, l| l, |p| p).joints;
+        let figures = |lift_feet: bool| {
+            let settings = RetargetSettings { lift_feet, ..settings.clone() };
+            let moved = retarget_body(&turned, "turned", &body, &settings).unwrap();
+            foot_figures(&turned, &moved, &body).unwrap()
+        };
+        let (held, free) = (figures(true), figures(false));
+        assert!(free.deepest > 0.1 && held.deepest < 0.002, "{turn}: {held:?}, {free:?}");
+        assert!(held.acceleration_p99 < free.acceleration_p99 + 20.0, "{turn}: {held:?}, {free:?}");
     }
-    speeds.sort_by(f64::total_cmp);
-    speeds.get(speeds.len() / 2).copied().unwrap_or(0.0)
 }
 
 #[test]

@@ -7,7 +7,7 @@
 //! - [`BodyModel`]: the statistical body (eq. 1 joints by [`mean_value`], eq. 2 shape) from the committed asset;
 //! - [`dress_pose`]: the A- and T-pose of any skeleton;
 //! - [`Motion`]: a pose over time; [`interpolation`]: poses between poses;
-//! - [`two_bone`], [`feet`], [`soles`]: inverse kinematics of arms and legs, feet kept out of the floor by joints or by the skin;
+//! - [`two_bone`], [`feet`], [`soles`]: inverse kinematics of arms and legs, ankles moved by the leg, the skin of the soles;
 //! - [`GarmentType`]: the kind of garment that a layer is.
 //!
 //! Subject frame: +Y up, +Z the front, +X the subject's left; metres, radians, seconds.

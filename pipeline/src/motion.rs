@@ -3,35 +3,27 @@
 use std::path::Path;
 
 use toile_animation::{
-    AnimationError, Bvh, RetargetSettings, Retargeted, blend::Clothed, bvh, bvh::RestJoint, retarget, shipped_walk,
+    AnimationError, Bvh, RetargetSettings, Retargeted, blend::Clothed, bvh, bvh::RestJoint, retarget, retarget_body,
+    shipped_walk,
 };
 use toile_avatar::{MotionJoint, read_motion};
 use toile_capture::files::read_limited;
-use toile_character::{BodyModel, Pose, Skeleton, SkinnedMesh, soles::Soles};
-use toile_geometry::{
-    Mesh,
-    statistics::{Rank, quantile_by},
-};
+use toile_character::{BodyModel, Pose, SkinnedMesh};
+use toile_geometry::Mesh;
 
 use crate::PipelineError;
 
 /// Name of the clip when no motion was given.
 pub const WALK: &str = "walk";
 
-/// Reads the motion and carries it onto `body`, whose own soles stay out of the floor where the settings lift feet.
+/// Reads the motion and carries it onto `body`, whose own skin stands on the floor and stays out of it where the settings lift feet.
 ///
 /// # Errors
 /// [`PipelineError`] where the file is no motion that can be read, or its skeleton is not a person's.
 pub fn load(path: Option<&Path>, body: &SkinnedMesh, settings: &RetargetSettings) -> Result<Retargeted, PipelineError> {
-    let mut moved = carried(path, &body.skeleton, settings)?;
-    if settings.lift_feet {
-        let soles = Soles::new(body);
-        soles.lift(&mut moved.motion.poses);
-        let mut heights: Vec<f64> = moved.motion.poses.iter().map(|pose| soles.height(pose)).collect();
-        let low = quantile_by(&mut heights, 0.02, Rank::Count);
-        moved.report.foot_below_floor = low.map_or(0.0, |height| (-height).max(0.0));
-    }
-    Ok(moved)
+    let (bvh, name) = source(path)?;
+    let at = path.unwrap_or(Path::new(WALK));
+    retarget_body(&bvh, &name, body, settings).map_err(|e| PipelineError::stage(at, e))
 }
 
 /// As [`load`], for somebody who wears the garments among `layers` (the first is the body, which is in `pose0`): arms are held as far
@@ -70,16 +62,20 @@ const NOTICED: f64 = 5.0;
 /// # Errors
 /// As [`load`].
 pub fn check(path: &Path) -> Result<(), PipelineError> {
-    carried(Some(path), &BodyModel::load_default()?.mean_skeleton, &RetargetSettings::default()).map(drop)
+    let (bvh, name) = source(Some(path))?;
+    let mean = BodyModel::load_default()?.mean_skeleton;
+    retarget(&bvh, &name, &mean, &RetargetSettings::default()).map_err(|e| PipelineError::stage(path, e)).map(drop)
 }
 
-fn carried(path: Option<&Path>, skeleton: &Skeleton, settings: &RetargetSettings) -> Result<Retargeted, PipelineError> {
-    let (bvh, name) = match path {
+/// The motion as its file has it, and its name; the shipped walk where there is no file.
+///
+/// # Errors
+/// [`PipelineError`] where the file is no motion that can be read.
+pub fn source(path: Option<&Path>) -> Result<(Bvh, String), PipelineError> {
+    Ok(match path {
         Some(path) => (read(path)?, path.file_stem().unwrap_or_default().to_string_lossy().into_owned()),
         None => (shipped_walk().map_err(|e| PipelineError::stage(Path::new(WALK), e))?, WALK.to_string()),
-    };
-    let at = path.unwrap_or(Path::new(WALK));
-    retarget(&bvh, &name, skeleton, settings).map_err(|e| PipelineError::stage(at, e))
+    })
 }
 
 fn read(path: &Path) -> Result<Bvh, PipelineError> {
@@ -124,9 +120,18 @@ pub fn walk_length() -> (f64, f64) {
 mod tests {
     use nalgebra::Point3;
     use toile_avatar::{Avatar, AvatarLayer, write_glb};
-    use toile_character::{JointNaming, SkinWeights};
+    use toile_character::{JointNaming, Skeleton, SkinWeights};
 
     use super::*;
+
+    fn carried(
+        path: Option<&Path>,
+        skeleton: &Skeleton,
+        settings: &RetargetSettings,
+    ) -> Result<Retargeted, PipelineError> {
+        let (bvh, name) = source(path)?;
+        retarget(&bvh, &name, skeleton, settings).map_err(|e| PipelineError::stage(Path::new("test"), e))
+    }
 
     /// A GLB of the mean person with the shipped walk, its glTF text changed by `edit`.
     fn walking(model: &BodyModel, edit: impl Fn(&mut serde_json::Value)) -> Vec<u8> {

@@ -1,6 +1,7 @@
 //! Names of joints taken apart: side, part of the body, segment of a chain.
 //!
-//! Reads the names of VRM, Unity, Mixamo, H-Anim, MakeHuman, CMU conversions, Bandai Namco, Biped, Unreal, SMPL
+//! Reads the names of VRM, Unity, Mixamo, H-Anim, MakeHuman, CMU conversions, Bandai Namco, Biped, Unreal, SMPL, Rigify,
+//! Auto-Rig Pro, DAZ, Character Creator, OptiTrack, Xsens, Rokoko, Perception Neuron, DeepMotion, Second Life, MikuMikuDance
 //! and their like: sides as word, letter, prefix or suffix; any separators; camel case or not.
 
 /// Side of the body.
@@ -26,7 +27,7 @@ pub(crate) const UPPER_LEG: &[&str] = &["upperleg", "upleg", "thigh", "thighbend
 pub(crate) const LOWER_LEG: &[&str] = &["lowerleg", "loleg", "lowleg", "shin", "calf", "knee", "tibia", "leg"];
 pub(crate) const FOOT: &[&str] = &["ankle", "talocrural", "foot"];
 pub(crate) const TOES: &[&str] = &["toes", "toebase", "toe", "ball", "metatarsal", "metatarsophalangeal", "foot"];
-pub(crate) const CLAVICLE: &[&str] = &["clavicle", "collar", "collarbone", "sternoclavicular", "shoulder"];
+pub(crate) const CLAVICLE: &[&str] = &["clavicle", "collar", "collarbone", "sternoclavicular", "scapula", "shoulder"];
 pub(crate) const UPPER_ARM: &[&str] = &["upperarm", "uparm", "humerus", "arm", "shldr", "shldrbend", "shoulder"];
 pub(crate) const LOWER_ARM: &[&str] =
     &["lowerarm", "loarm", "lowarm", "forearm", "forearmbend", "elbow", "radius", "ulna"];
@@ -37,17 +38,56 @@ pub(crate) const HEAD: &[&str] = &["head", "skullbase", "skull"];
 const FINGERS: [&[&str]; 5] = [&["thumb"], &["index"], &["middle", "mid"], &["ring"], &["little", "pinky"]];
 
 /// Words that decorate names and carry no meaning.
-const NOISE: &[&str] =
-    &["joint", "jnt", "bone", "bip", "j", "c", "def", "org", "valve", "biped", "mixamorig", "character", "skel"];
+const NOISE: &[&str] = &[
+    "joint",
+    "jnt",
+    "bone",
+    "bip",
+    "j",
+    "c",
+    "m",
+    "x",
+    "def",
+    "org",
+    "valve",
+    "biped",
+    "mixamorig",
+    "character",
+    "skel",
+    "stretch",
+];
+
+/// What is written for words that are not taken apart as others are: OptiTrack's short arms, whose `LF` would be a side, and the
+/// Japanese of MikuMikuDance's models, longer words before those that they contain.
+const WRITTEN_FOR: [(&str, &str); 17] = [
+    ("LUArm", "L upperarm"),
+    ("RUArm", "R upperarm"),
+    ("LFArm", "L forearm"),
+    ("RFArm", "R forearm"),
+    ("左", "left "),
+    ("右", "right "),
+    ("足首", "ankle "),
+    ("足", "leg "),
+    ("ひざ", "knee "),
+    ("つま先", "toe "),
+    ("肩", "collar "),
+    ("腕", "arm "),
+    ("ひじ", "elbow "),
+    ("手首", "wrist "),
+    ("親指", "thumb "),
+    ("頭", "head "),
+    ("首", "neck "),
+];
 
 impl JointName {
     /// Takes `name` apart.
     pub fn parse(name: &str) -> Self {
-        let local = name.rsplit(':').next().unwrap_or(name);
+        let local = name.rsplit([':', '|', '/']).next().unwrap_or(name);
+        let plain = WRITTEN_FOR.iter().fold(local.to_string(), |name, (written, word)| name.replace(written, word));
         let mut side = Side::Middle;
         let mut part = String::new();
         let mut numbers = Vec::new();
-        for word in words(local) {
+        for word in words(&plain) {
             if let Ok(number) = word.parse::<u32>() {
                 numbers.push(number);
             } else if let (Some(found), Side::Middle) = (side_of_word(&word), side) {

@@ -4,6 +4,7 @@ use toile_character::Joint;
 
 use super::{
     joint_names::{CLAVICLE, FOOT, HAND, HEAD, JointName, LOWER_ARM, LOWER_LEG, Side, TOES, UPPER_ARM, UPPER_LEG},
+    prefix,
     source::{Source, Tip},
 };
 use crate::{AnimationError, Bvh};
@@ -22,7 +23,9 @@ pub(super) struct Tree<'a> {
 
 impl<'a> Tree<'a> {
     pub fn new(bvh: &'a Bvh) -> Self {
-        let names = bvh.joints.iter().map(|j| JointName::parse(&j.name)).collect();
+        let written: Vec<&str> = bvh.joints.iter().map(|j| j.name.as_str()).collect();
+        let prefix = prefix::common(&written);
+        let names = written.iter().map(|n| JointName::parse(n.strip_prefix(prefix).unwrap_or(n))).collect();
         let mut depths: Vec<usize> = Vec::with_capacity(bvh.joints.len());
         for joint in &bvh.joints {
             depths.push(joint.parent.map_or(0, |p| depths[p] + 1));

@@ -311,6 +311,9 @@ pub const FIELDS: &[Field] = &[
     switch("motion.in_place", "Stay in place: the travel over the ground is left out."),
     switch("motion.looped", "Cut and blend the motion so that its end goes over into its start, in place."),
     switch("motion.fingers", "Turn finger joints where the source has them."),
-    switch("motion.lift_feet", "Lift feet that would dip below the floor, by bending the knee."),
+    switch(
+        "motion.lift_feet",
+        "Hold feet that stand in their place on the floor, and lift out of it what would dip below.",
+    ),
     switch("motion.room_for_clothes", "Hold arms as far from the body as the clothes between them need."),
 ];

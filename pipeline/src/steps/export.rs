@@ -112,7 +112,7 @@ impl Export<'_> {
 impl Step for Export<'_> {
     type Report = Exported;
     const NAME: &'static str = "export";
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
     const SECONDS: f64 = 1.0;
 
     fn label(&self) -> String {

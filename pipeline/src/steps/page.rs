@@ -45,7 +45,7 @@ pub struct Page<'a> {
 impl Step for Page<'_> {
     type Report = ();
     const NAME: &'static str = "report";
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
     const SECONDS: f64 = 4.0;
     const OUTPUTS_VARY: bool = true;
 
