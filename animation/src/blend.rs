@@ -23,9 +23,11 @@ mod room;
 mod squeeze;
 mod wearer;
 
+pub(crate) use anchors::{Closeness, frequency};
 pub use layer::OutfitLayer;
 pub use outfit::Outfit;
 pub use room::{Clothed, Room};
+pub(crate) use wearer::DRAG;
 pub use wearer::Wearer;
 
 use serde::{Deserialize, Serialize};

@@ -5,6 +5,7 @@
 //! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
 //! - [`blend`]: the layers of an outfit in motion, by skinning and by cloth;
 //! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
+//! - [`springs`]: chains of joints on which loose parts swing in other programs;
 //! - [`resample`], [`close_loop`]: other rates, endless motions.
 //!
 //! ```
@@ -26,6 +27,7 @@ pub mod decomposition;
 mod error;
 mod retarget;
 mod skeleton;
+pub mod springs;
 mod walk;
 
 pub use bvh::Bvh;

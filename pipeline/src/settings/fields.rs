@@ -313,4 +313,5 @@ pub const FIELDS: &[Field] = &[
     switch("motion.fingers", "Turn finger joints where the source has them."),
     switch("motion.lift_feet", "Lift feet that would dip below the floor, by bending the knee."),
     switch("motion.room_for_clothes", "Hold arms as far from the body as the clothes between them need."),
+    choice("avatar.springs", &["on", "off"], "Whether skirts, dresses and coats swing by spring bones in avatar.vrm."),
 ];
