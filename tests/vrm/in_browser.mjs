@@ -40,7 +40,9 @@ try {
   page.on("console", (message) => ["error", "warning"].includes(message.type()) && faults.push(message.text()));
   page.on("pageerror", (error) => faults.push(String(error)));
   await page.goto(`http://127.0.0.1:${server.address().port}/`);
-  await page.waitForFunction(() => window.ready !== undefined, null, { timeout: 60_000 });
+  await page.waitForFunction(() => window.ready !== undefined, null, { timeout: 60_000 }).catch((error) => {
+    throw new Error([String(error), ...faults].join("\n"));
+  });
   const meshes = await page.evaluate(async () => {
     const bytes = await (await fetch("/avatar.vrm")).arrayBuffer();
     const motion = await (await fetch("/motion.json")).json();

@@ -11,7 +11,8 @@ use crate::scene::{SETTLE, Scene, UPDATES};
 /// The garment's vertices in each frame of the simulation; `None` where Node, Chromium or the packages are missing.
 pub fn play(scene: &Scene) -> Option<Vec<Vec<Point3<f32>>>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let packages = toile_outside::file(&root.join("../target/outside/vrm"))?;
+    let packages = root.join("../target/outside");
+    toile_outside::file(&packages.join("node_modules/@pixiv/three-vrm"))?;
     let (node, _) = (toile_outside::program("node")?, toile_outside::program("chromium")?);
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
