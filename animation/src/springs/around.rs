@@ -7,7 +7,7 @@ use toile_character::Joint;
 
 use super::layer::RestedLayer;
 
-/// Chains around the body: cloth between two of them, 100 mm apart on a wide skirt, bows by less than a sensor's noise more than its chord.
+/// Chains around the body: cloth between two of them, 105 mm apart where a skirt has a radius of 0.2 m, bows by 7 mm over its chord.
 pub(super) const CHAINS: usize = 12;
 
 /// A vertical axis between the legs.
