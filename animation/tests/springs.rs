@@ -100,9 +100,10 @@ fn capsules_fill_the_thighs() {
             .map(|v| worn.body.positions[v].cast::<f64>())
             .filter(|p| p.y > knee && p.y < knee + 0.2);
         let off: Vec<f64> = skin.map(|p| capsules.iter().map(|c| c.distance(&p)).fold(f64::MAX, f64::min)).collect();
+        // A capsule has one radius where a thigh tapers: its skin lies inside.
         let mean = off.iter().map(|d| d.abs()).sum::<f64>() / off.len() as f64;
         let out = off.iter().copied().fold(f64::MIN, f64::max);
-        assert!(off.len() > 100 && mean < 0.012 && out < 0.015, "{mean} m on average, {out} m outside");
+        assert!(off.len() > 100 && mean < 0.02 && out < 0.005, "{mean} m on average, {out} m outside");
     }
 }
 
@@ -127,7 +128,8 @@ fn weights_are_few_and_change_gently() {
         own = own.max(on_chains);
         let beside = (v as u32) / AROUND * AROUND + (v as u32 + 1) % AROUND;
         let change: f32 = row.iter().zip(dense(beside)).map(|(a, b)| (a - b).abs()).sum();
-        assert!(change < 0.35, "weights of {v} and its neighbour differ by {change}");
+        // From chain to chain, over 7.5 vertices, all of the weight moves: by 0.27 a vertex, more where a fifth influence is left out.
+        assert!(change < 0.5, "weights of {v} and its neighbour differ by {change}");
     }
     assert!((0.5..=1.0).contains(&own), "at most {own} on chains");
 }
