@@ -2,6 +2,7 @@
 # Outside programs that the tests ask about our files. Each is optional: a test whose program is missing says so and passes.
 # With TOILE_REQUIRE_OUTSIDE=1 the test fails instead, and so does this script.
 #   target/outside/node_modules/gltf-validator   Khronos' glTF validator (npm)
+#   target/outside/node_modules/@pixiv/three-vrm three.js, its VRM loader, and what drives Chromium (npm); Chromium is Debian's, as for the console
 #   assimp                                       loads GLB (Debian's assimp-utils)
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -20,6 +21,16 @@ if [ ! -d target/outside/node_modules/gltf-validator ]; then
             missing gltf-validator "npm could not install it (target/outside/npm.log)"
     else
         missing gltf-validator "it is installed with npm, which is missing too"
+    fi
+fi
+
+if [ ! -d target/outside/node_modules/@pixiv/three-vrm ]; then
+    if command -v npm >/dev/null; then
+        echo "outside: installing three-vrm"
+        (cd target/outside && timeout 180 npm install --no-audit --no-fund --silent @pixiv/three-vrm@3.5.5 three@0.187.0 playwright-core@1.58.0 >npm.log 2>&1) ||
+            missing three-vrm "npm could not install it (target/outside/npm.log)"
+    else
+        missing three-vrm "it is installed with npm, which is missing too"
     fi
 fi
 

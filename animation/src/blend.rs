@@ -24,9 +24,11 @@ mod squeeze;
 mod strain;
 mod wearer;
 
+pub(crate) use anchors::{Closeness, frequency};
 pub use layer::OutfitLayer;
 pub use outfit::Outfit;
 pub use room::{Clothed, Room};
+pub(crate) use wearer::DRAG;
 pub use wearer::Wearer;
 
 use serde::{Deserialize, Serialize};

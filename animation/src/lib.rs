@@ -6,6 +6,7 @@
 //! - [`blend`]: the layers of an outfit in motion, by skinning and by cloth;
 //! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
 //! - [`foot_figures`]: how well the feet of a motion stand, measured on the body's surface;
+//! - [`springs`]: chains of joints on which loose parts swing in other programs;
 //! - [`resample`], [`close_loop`]: other rates, endless motions.
 //!
 //! ```
@@ -29,6 +30,7 @@ mod foot_figures;
 mod footing;
 mod retarget;
 mod skeleton;
+pub mod springs;
 mod walk;
 
 pub use bvh::Bvh;

@@ -25,6 +25,9 @@ pub enum AvatarError {
     /// Helper joints that do not fit the avatar or each other.
     #[error("helper joints: {0}")]
     Helpers(String),
+    /// Spring bones that do not fit the avatar or have no meaning.
+    #[error("spring bones: {0}")]
+    Springs(String),
     /// The avatar as a whole, or its meta data.
     #[error("avatar: {0}")]
     Avatar(String),

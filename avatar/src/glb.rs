@@ -43,7 +43,7 @@ pub(crate) fn document(avatar: &Avatar, rig: &Rig, buffer: &mut Buffer) -> Map<S
         }));
     }
     // Skinned meshes belong at the top: a parent's transform would be ignored.
-    let roots: Vec<usize> = std::iter::once(0).chain(first_mesh_node..nodes.len()).collect();
+    let roots: Vec<usize> = std::iter::once(rig.top()).chain(first_mesh_node..nodes.len()).collect();
     let skin = rig.skin(buffer);
     let parts = json!({
         "asset": { "version": "2.0", "generator": GENERATOR },

@@ -4,7 +4,7 @@
 //! - [`write_glb`]: one mesh node a layer, one skin, one animation a motion; with a single layer, a rigged scan;
 //! - [`write_glb_with_helpers`]: the same with joints beside the skeleton's, which show one motion of layers that swing;
 //! - [`write_textured`]: one mesh with a texture, without bones;
-//! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named.
+//! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named, and with springs where parts hang loose.
 //!
 //! ```
 //! use nalgebra::Point3;
@@ -44,6 +44,7 @@ mod layer_mesh;
 mod motion;
 mod point_cache;
 mod rig;
+mod springs;
 mod textured;
 mod vrm;
 

@@ -2,13 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
-use toile_character::{Joint, JointNaming, Pose, Skeleton, dress_pose::t_pose, joint::JOINTS};
+use toile_character::{Joint, JointNaming, Pose, Skeleton, SpringBones, dress_pose::t_pose, joint::JOINTS};
 
 use crate::{
     Avatar, AvatarError,
     buffer::Buffer,
     glb::{document, finish},
     rig::Rig,
+    springs,
 };
 
 /// The licence text that VRM 1.0 files refer to.
@@ -85,27 +86,37 @@ pub fn vrm_pose(skeleton: &Skeleton) -> Pose {
 ///
 /// All layers are moved to the T-pose by their skin weights (A → T baking) with feet at the height they rest at;
 /// bones rest without rotation, facing +Z; all 52 joints are named, among them the 15 that VRM requires. Motions
-/// are left out: VRM keeps them in files of their own.
+/// are left out: VRM keeps them in files of their own. With `springs`, found at rest in that T-pose, loose parts swing
+/// (VRMC_springBone-1.0).
 ///
 /// # Errors
-/// As [`Avatar::validate`]; [`AvatarError::Avatar`] where no author is named.
-pub fn write_vrm(avatar: &Avatar, meta: &VrmMeta) -> Result<Vec<u8>, AvatarError> {
+/// As [`Avatar::validate`]; [`AvatarError::Avatar`] where no author is named; [`AvatarError::Springs`] where the spring bones do not fit the
+/// avatar or have no meaning.
+pub fn write_vrm(avatar: &Avatar, meta: &VrmMeta, springs: Option<&SpringBones>) -> Result<Vec<u8>, AvatarError> {
     if meta.authors.is_empty() || meta.authors.iter().any(|a| a.trim().is_empty()) {
         return Err(AvatarError::Avatar("a VRM file names at least one author".into()));
     }
-    let baked = Avatar { joint_names: JointNaming::Vrm, ..avatar.in_pose(&vrm_pose(&avatar.skeleton))? };
-    let rig = Rig::unturned(&baked.skeleton, &baked.pose0);
+    let mut baked = Avatar { joint_names: JointNaming::Vrm, ..avatar.in_pose(&vrm_pose(&avatar.skeleton))? };
+    let mut rig = Rig::unturned(&baked.skeleton, &baked.pose0);
+    if let Some(springs) = springs {
+        springs::hang(&mut baked, springs)?;
+        rig = rig.with_springs(springs);
+    }
     let mut buffer = Buffer::default();
     let mut document = document(&baked, &rig, &mut buffer);
-    document.insert("extensionsUsed".into(), json!(["VRMC_vrm"]));
-    document.insert("extensions".into(), json!({ "VRMC_vrm": extension(&baked, meta) }));
+    let mut extensions = json!({ "VRMC_vrm": extension(&baked, meta, rig.node_count()) });
+    if let Some(springs) = springs {
+        extensions[springs::EXTENSION] = springs::extension(springs, &baked, rig.top());
+    }
+    let used: Vec<String> = extensions.as_object().into_iter().flatten().map(|(name, _)| name.clone()).collect();
+    document.insert("extensionsUsed".into(), json!(used));
+    document.insert("extensions".into(), extensions);
     finish(buffer, document)
 }
 
-fn extension(avatar: &Avatar, meta: &VrmMeta) -> Value {
+fn extension(avatar: &Avatar, meta: &VrmMeta, first_mesh_node: usize) -> Value {
     let bones: Map<String, Value> =
         JOINTS.iter().map(|j| (j.name().to_string(), json!({ "node": j.index() }))).collect();
-    let first_mesh_node = JOINTS.len();
     let annotations: Vec<Value> =
         (0..avatar.layers.len()).map(|i| json!({ "node": first_mesh_node + i, "type": "auto" })).collect();
     json!({

@@ -106,7 +106,7 @@ fn joints_are_called_as_asked_for_and_vrm_keeps_its_own() {
         let expected: Vec<String> = JOINTS.iter().map(|&joint| naming.name(joint)).collect();
         assert_eq!(joints(&write_glb(&avatar).unwrap()), expected);
         assert_eq!(
-            joints(&write_vrm(&avatar, &VrmMeta::default()).unwrap())[Joint::LeftUpperArm.index()],
+            joints(&write_vrm(&avatar, &VrmMeta::default(), None).unwrap())[Joint::LeftUpperArm.index()],
             "leftUpperArm"
         );
     }

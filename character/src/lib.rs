@@ -8,7 +8,7 @@
 //! - [`dress_pose`]: the A- and T-pose of any skeleton;
 //! - [`Motion`]: a pose over time; [`interpolation`]: poses between poses;
 //! - [`two_bone`], [`feet`], [`soles`]: inverse kinematics of arms and legs, ankles moved by the leg, the skin of the soles;
-//! - [`GarmentType`]: the kind of garment that a layer is.
+//! - [`GarmentType`]: the kind of garment that a layer is; [`SpringBones`]: joints on which its loose parts swing.
 //!
 //! Subject frame: +Y up, +Z the front, +X the subject's left; metres, radians, seconds.
 //!
@@ -43,6 +43,7 @@ pub mod skin;
 mod skinned_mesh;
 pub mod skinning;
 pub mod soles;
+mod spring_bones;
 pub mod transfer;
 pub mod two_bone;
 
@@ -60,3 +61,4 @@ pub use skeleton::Skeleton;
 pub use skin::SkinWeights;
 pub use skinned_mesh::SkinnedMesh;
 pub use skinning::{PosedSkin, Skinner, Skinning};
+pub use spring_bones::{SpringBones, SpringChain, SpringCollider, SpringJoint};

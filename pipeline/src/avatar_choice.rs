@@ -15,7 +15,7 @@ use crate::{
     PipelineError,
     folders::Folders,
     json, motion,
-    options::{HiddenChoice, MotionChoice, Options},
+    options::{HiddenChoice, MotionChoice, Options, Springs},
 };
 
 /// The choices for an avatar. The default is the shipped walk, VRM's joint names, and whole layers.
@@ -28,6 +28,9 @@ pub struct AvatarChoice {
     pub joint_names: JointNaming,
     /// How what clothes hide is left out; without, nothing is.
     pub hidden: Option<CullSettings>,
+    /// Whether loose parts swing in `avatar.vrm`; without, as the settings say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub springs: Option<Springs>,
 }
 
 impl AvatarChoice {
@@ -57,6 +60,7 @@ impl AvatarChoice {
             HiddenChoice::Whole => choice.hidden = None,
             HiddenChoice::LeftOut(settings) => choice.hidden = Some(settings.clone()),
         }
+        choice.springs = options.springs.or(choice.springs);
         choice.joint_names = options.joint_names.unwrap_or(choice.joint_names);
         if choice != before {
             atomic_write(&folders.avatar_choice(), &json::pretty(&choice)?)?;
@@ -80,7 +84,9 @@ impl AvatarChoice {
         let is_vrm = self.joint_names == JointNaming::Vrm;
         let names =
             (!is_vrm).then(|| "joint names of another system (--joint-names vrm for the usual ones)".to_string());
-        [motion, hidden, names].into_iter().flatten().collect()
+        let springs = (self.springs == Some(Springs::Off))
+            .then(|| "nothing that swings in avatar.vrm (--springs on for springs)".to_string());
+        [motion, hidden, names, springs].into_iter().flatten().collect()
     }
 }
 

@@ -62,7 +62,7 @@ pub use meshes::read_mesh;
 pub use motion::walk_length;
 pub use observer::{Observer, Silent};
 pub use opened::Opened;
-pub use options::{FusionChoice, Goal, HiddenChoice, MotionChoice, Options};
+pub use options::{FusionChoice, Goal, HiddenChoice, MotionChoice, Options, Springs};
 pub use plan::{Plan, Standing, plan};
 pub use process::process;
 pub use record::{Record, steps_in};

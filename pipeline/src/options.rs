@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use serde::{Deserialize, Serialize};
 use toile_character::JointNaming;
 use toile_fusion::FusionSettings;
 use toile_garments::CullSettings;
@@ -32,6 +33,8 @@ pub struct Options {
     pub joint_names: Option<JointNaming>,
     /// The hidden triangles that the avatar leaves out.
     pub hidden: HiddenChoice,
+    /// Whether loose parts swing in `avatar.vrm`; without, as before.
+    pub springs: Option<Springs>,
     /// Stop after this layer; without, all of them.
     pub last_layer: Option<String>,
     /// A file of settings beside the subject's own `toile.toml`.
@@ -66,6 +69,17 @@ pub enum HiddenChoice {
     Whole,
     /// The triangles that no one can see.
     LeftOut(CullSettings),
+}
+
+/// Whether loose parts of garments swing on springs in `avatar.vrm`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Springs {
+    /// Where something hangs loose.
+    #[default]
+    On,
+    /// Never: everything follows the skeleton.
+    Off,
 }
 
 /// Changes the settings of the fusion.

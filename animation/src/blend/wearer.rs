@@ -14,7 +14,7 @@ const LONGEST_WAY: f32 = 0.015;
 /// Steps of the simulation in a frame: at least, at most.
 const STEPS: (usize, usize) = (2, 6);
 /// Rate at which the air and the layers below damp cloth that moves against the body, 1/s.
-const DRAG: f64 = 7.0;
+pub(crate) const DRAG: f64 = 7.0;
 /// Deceleration by the cloth's own friction, m/s²: a twentieth of gravity, assumed.
 const DRY: f64 = 0.5;
 /// Time in which corrections fade, seconds: less than a step of a walk, so that no phase of it carries those of the others. Chosen by trying.

@@ -316,4 +316,5 @@ pub const FIELDS: &[Field] = &[
         "Hold feet that stand in their place on the floor, and lift out of it what would dip below.",
     ),
     switch("motion.room_for_clothes", "Hold arms as far from the body as the clothes between them need."),
+    choice("avatar.springs", &["on", "off"], "Whether skirts, dresses and coats swing by spring bones in avatar.vrm."),
 ];

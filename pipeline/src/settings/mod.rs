@@ -14,6 +14,7 @@ use toile_fusion::FusionSettings;
 use toile_garments::{ExtractSettings, StackSettings};
 use toile_texture::TextureSettings;
 
+use crate::options::Springs;
 pub use print::print;
 pub use read::{FILE_NAME, read};
 
@@ -35,4 +36,14 @@ pub struct Settings {
     pub stack: StackSettings,
     /// How a motion is carried over.
     pub motion: RetargetSettings,
+    /// How the avatar's files are made.
+    pub avatar: AvatarSettings,
+}
+
+/// How the avatar's files are made.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AvatarSettings {
+    /// Whether loose parts of garments swing in `avatar.vrm`. Default on.
+    pub springs: Springs,
 }

@@ -10,10 +10,13 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use toile_animation::{RetargetReport, Retargeted};
-use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, write_glb, write_vrm};
-use toile_character::JointNaming;
-use toile_garments::{CullSettings, GarmentError, Worn, hidden_triangles};
+use toile_animation::{
+    RetargetReport, Retargeted,
+    springs::{self, RestedLayer},
+};
+use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, vrm_pose, write_glb, write_vrm};
+use toile_character::{JointNaming, SpringBones};
+use toile_garments::{CullSettings, GarmentError, GarmentType, Worn, hidden_triangles};
 use toile_geometry::Mesh;
 
 use crate::{
@@ -25,6 +28,7 @@ use crate::{
     look::Look,
     meshes::{read_mesh, read_skinned},
     motion,
+    options::Springs,
     step::{Product, Step},
 };
 
@@ -47,8 +51,23 @@ pub struct Exported {
     pub motion: RetargetReport,
     /// Triangles that were left out because clothes hide them, by layer; empty where every layer is whole.
     pub left_out: BTreeMap<String, LeftOut>,
+    /// The spring bones of the VRM file, where something hangs loose and they are wanted.
+    pub springs: Option<Hung>,
     /// The layers in the exported motion and in the T-pose of the VRM file.
     pub look: Look,
+}
+
+/// Spring bones of the VRM file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Hung {
+    /// The layers that hang on them.
+    pub layers: Vec<String>,
+    /// Chains.
+    pub chains: usize,
+    /// Joints of all chains.
+    pub joints: usize,
+    /// Capsules in hips and legs.
+    pub colliders: usize,
 }
 
 /// Triangles of a layer that were left out.
@@ -63,6 +82,11 @@ pub struct LeftOut {
 impl Export<'_> {
     fn motion_path(&self) -> Option<PathBuf> {
         self.choice.motion_path(&self.run.folders)
+    }
+
+    /// Whether the VRM file has springs: as chosen for this avatar, else as the settings say.
+    fn has_springs(&self) -> bool {
+        self.choice.springs.unwrap_or(self.run.settings.avatar.springs) == Springs::On
     }
 
     /// The avatar as its files have it: in scan 0's pose, without what is left out.
@@ -136,6 +160,7 @@ impl Step for Export<'_> {
             "garments": json::plain(&self.garments)?,
             "choice": json::plain(self.choice)?,
             "retarget": json::plain(&self.run.settings.motion)?,
+            "springs": self.has_springs(),
             "vrm": json::plain(&VrmMeta::default())?,
         }))
     }
@@ -162,12 +187,40 @@ impl Step for Export<'_> {
         avatar.joint_names = self.choice.joint_names;
         let glb = write_glb(&avatar).map_err(wrong)?;
         progress(0.75);
-        let vrm = write_vrm(&avatar, &VrmMeta::default()).map_err(wrong)?;
+        let springs = if self.has_springs() { spring_bones(&avatar).map_err(wrong)? } else { None };
+        let vrm = write_vrm(&avatar, &VrmMeta::default(), springs.as_ref()).map_err(wrong)?;
         let files = self.outputs().into_iter().zip([glb, vrm]).collect();
         let of_motion = moved.report.warnings.iter().map(|w| format!("motion {}: {w}", look.motion));
         let warnings = of_motion.chain(look.warnings()).collect();
-        Ok(Product::new(files, Exported { motion: moved.report, left_out, look }, warnings))
+        let springs = springs.map(|s| Hung::of(&s, &avatar));
+        Ok(Product::new(files, Exported { motion: moved.report, left_out, springs, look }, warnings))
     }
+}
+
+impl Hung {
+    fn of(springs: &SpringBones, avatar: &Avatar) -> Self {
+        let hung = avatar.layers.iter().zip(&springs.weights).filter(|(_, w)| w.is_some());
+        Self {
+            layers: hung.map(|(l, _)| l.name.clone()).collect(),
+            chains: springs.chains.len(),
+            joints: springs.joint_count(),
+            colliders: springs.colliders.len(),
+        }
+    }
+}
+
+/// Spring bones for what hangs loose on the `avatar`, at rest in the T-pose of its VRM file.
+fn spring_bones(avatar: &Avatar) -> Result<Option<SpringBones>, AvatarError> {
+    let rest = vrm_pose(&avatar.skeleton);
+    let rested = avatar.in_pose(&rest)?;
+    let of_legs = [GarmentType::Trousers, GarmentType::Hat, GarmentType::Shoes];
+    let layer = |l: &'_ AvatarLayer| {
+        let named = l.garment.as_deref().and_then(GarmentType::from_layer_name);
+        l.order > 0 && !named.is_some_and(|kind| of_legs.contains(&kind))
+    };
+    let layers: Vec<RestedLayer<'_>> =
+        rested.layers.iter().map(|l| RestedLayer { mesh: &l.mesh, weights: &l.weights, may_hang: layer(l) }).collect();
+    Ok(springs::spring_bones(&rest.joint_positions(&avatar.skeleton), &layers))
 }
 
 /// Takes triangles that clothes hide off every layer, and vertices that none uses any more; a layer without triangles

@@ -17,6 +17,7 @@ use crate::{
     commands::{
         output::{Model, check_model, check_new, is_same_place},
         reach::{motion_choice, must_exist, reach},
+        springs::SpringsChoice,
     },
     outcome::Answer,
     session::Session,
@@ -30,7 +31,10 @@ With --cull-hidden both files lack what no one can see under closed cloth: body 
 inside of each hem, collar and cuff. Head, hands and feet stay, and what only loose or open cloth covers. The files are
 smaller, and nothing can poke through where nothing is; export again without it for whole layers.
 
-Motion, joint names and hidden triangles that are left out are remembered in SUBJECT/edits/: later runs make the same avatar.
+Where a skirt, dress or coat hangs loose around the legs, avatar.vrm has chains of spring bones (VRMC_springBone) on which it
+swings in other programs; --springs off leaves them out.
+
+Motion, joint names, springs and hidden triangles that are left out are remembered in SUBJECT/edits/: later runs make the same avatar.
 
 Examples:
   toile export anna --motion dance.bvh
@@ -64,11 +68,14 @@ pub struct Export {
     /// Keep this much inside of hems and openings, along the surface [default: 30]
     #[arg(long, value_name = "MM", requires = "cull_hidden")]
     cull_margin: Option<f32>,
+    /// Whether skirts, dresses and coats swing by spring bones in avatar.vrm (without: as the avatar was made last; on the first time)
+    #[arg(long, value_enum)]
+    springs: Option<SpringsChoice>,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Convert a recording: depth as plain 16-bit images (16UC1), which other viewers display
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "joint_names", "glb", "vrm", "cull_hidden"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "joint_names", "glb", "vrm", "cull_hidden", "springs"])]
     mcap: Option<PathBuf>,
 }
 
@@ -114,6 +121,7 @@ impl Export {
             motion: motion_choice(self.motion.as_deref()),
             joint_names: self.joint_names.map(Into::into),
             hidden: self.hidden()?,
+            springs: self.springs.map(Into::into),
             settings: self.settings.clone(),
             ..Options::default()
         };

@@ -28,5 +28,6 @@ pub mod reorder;
 pub mod sculpt;
 pub mod serve;
 pub mod settings;
+mod springs;
 pub mod synthesize;
 pub mod texture_size;

@@ -14,7 +14,7 @@ use toile_pipeline::{FusionChoice, Goal, Options, Summary, process as process_su
 
 use crate::{
     StudioError,
-    commands::{prior::PriorChoice, reach::motion_choice, texture_size::TextureSize},
+    commands::{prior::PriorChoice, reach::motion_choice, springs::SpringsChoice, texture_size::TextureSize},
     outcome::{Answer, error_document},
     session::Session,
 };
@@ -48,6 +48,9 @@ pub struct Process {
     /// The first take shows the person dressed: the body is estimated under the clothes, which become a layer (kept in edits/body.json)
     #[arg(long)]
     dressed: bool,
+    /// Whether skirts, dresses and coats swing by spring bones in avatar.vrm (without: as the avatar was made last; on the first time)
+    #[arg(long, value_enum)]
+    springs: Option<SpringsChoice>,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
@@ -70,6 +73,7 @@ impl Process {
             fusion: FusionChoice { prior: self.prior.map(Into::into), ..FusionChoice::default() },
             settings: self.settings.clone(),
             dressed: self.dressed,
+            springs: self.springs.map(Into::into),
             texture: self.texture.map(Into::into),
             ..Options::default()
         };

@@ -30,7 +30,7 @@ const TABLE: &[Row] = &[
     row("garments", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("cloth", &["geometry"], &[]),
     row("animation", &["geometry", "character", "cloth"], &["outside"]),
-    row("avatar", &["geometry", "character"], &["animation", "outside"]),
+    row("avatar", &["geometry", "character"], &["animation", "cloth", "garments", "outside", "synthetic"]),
     row("render", &["geometry"], &[]),
     row("synthetic", &["geometry", "capture", "character", "render"], &[]),
     row("driver-transport", &[], &["outside"]),
