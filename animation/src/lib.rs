@@ -5,7 +5,7 @@
 //! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
 //! - [`blend`]: the layers of an outfit in motion, by skinning and by cloth;
 //! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
-//! - [`resample`], [`close_loop`]: other rates, endless motions.
+//! - [`resample`], [`close_loop`], [`turn_of_loop`]: other rates, endless motions.
 //!
 //! ```
 //! use toile_animation::{RetargetSettings, retarget, shipped_walk};
@@ -30,5 +30,5 @@ mod walk;
 
 pub use bvh::Bvh;
 pub use error::AnimationError;
-pub use retarget::{RetargetReport, RetargetSettings, Retargeted, close_loop, resample, retarget};
+pub use retarget::{RetargetReport, RetargetSettings, Retargeted, close_loop, resample, retarget, turn_of_loop};
 pub use walk::{SHIPPED_WALK, WalkSettings, shipped_walk, walk};
