@@ -1,6 +1,6 @@
 //! A sheet: its rest shape, what it is made of, and where it is now.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::{
     ClothError, Fabric,
@@ -44,6 +44,13 @@ impl Sheet {
             carried: Vec::new(),
             system: None,
         })
+    }
+
+    /// Takes the sheet and its anchors along with a rigid transform, velocities turned with it.
+    pub fn moved_by(&mut self, to: &Isometry3<f64>) {
+        let places = self.positions.iter_mut().chain(&mut self.carried);
+        places.for_each(|p| *p = to.transform_point(&Point3::from(*p)).coords);
+        self.velocities.iter_mut().for_each(|v| *v = to * *v);
     }
 
     /// What decides how the sheet moves on, to the bit: places, velocities, forces of contact, and where the anchors were.

@@ -10,6 +10,9 @@ mod options;
 mod pictures;
 mod playable;
 mod report;
+#[cfg(test)]
+mod trials;
+mod variants;
 
 use std::path::{Component, Path, PathBuf};
 

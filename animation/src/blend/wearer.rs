@@ -73,6 +73,11 @@ impl<'a> Wearer<'a> {
         }
     }
 
+    /// The last pose.
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
     /// Vertices of all layers, as they were left by the last [`Wearer::advance`].
     pub fn layers(&self) -> &[Vec<Point3<f32>>] {
         &self.layers
@@ -117,6 +122,21 @@ impl<'a> Wearer<'a> {
             Blend::Physics | Blend::Seed => self.mix(),
         }
         Ok(())
+    }
+
+    /// Takes body and cloth along as one rigid thing to where the hips of `pose` are: what a person who is set down elsewhere wears.
+    pub fn carry_to(&mut self, pose: &Pose) {
+        let hips = |pose: &Pose| pose.joint_frames(&self.outfit.skeleton)[0];
+        let carried = hips(pose) * hips(&self.pose).inverse();
+        let place = |p: &mut Vector3<f64>| *p = carried.transform_point(&Point3::from(*p)).coords;
+        for (k, sheet) in self.sheets.iter_mut().enumerate() {
+            sheet.moved_by(&carried);
+            self.carried[k].iter_mut().for_each(place);
+        }
+        let to = carried.cast::<f32>();
+        let body: Vec<Point3<f32>> = self.body.positions().iter().map(|p| to * p).collect();
+        self.body.move_to(&body);
+        self.pose = self.pose.moved(&carried, &self.outfit.skeleton);
     }
 
     /// Takes of each garment's simulated motion the share that the blend gives it: Hu et al. 2017, eq. 8, with w_p = 1 for physics alone.
@@ -180,6 +200,11 @@ impl<'a> Wearer<'a> {
         let (from, to) = (joints(&self.pose), joints(pose));
         let hips = to[0] - from[0];
         from.iter().zip(&to).map(|(a, b)| (b - a - hips).norm()).fold(0.0, f64::max)
+    }
+
+    /// Way of the hips from the last pose to this, metres.
+    pub fn travel_to(&self, pose: &Pose) -> f64 {
+        (pose.translation - self.pose.translation).norm()
     }
 
     /// Steps that the simulation needs for the way from the last pose to this.

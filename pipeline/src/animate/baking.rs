@@ -2,10 +2,12 @@
 
 use std::{path::Path, time::Instant};
 
+use nalgebra::Point3;
 use toile_animation::blend::{Blend, Outfit, OutfitLayer};
 use toile_avatar::{Avatar, AvatarLayer};
 use toile_character::Motion;
 use toile_cloth::Fabric;
+use toile_geometry::{bvh::Bvh, intersection::self_crossings};
 
 use super::{
     caches::{Caches, Written},
@@ -16,6 +18,7 @@ use super::{
     pictures::Pictures,
     playable,
     report::{AnimationReport, FrameReport},
+    variants,
 };
 use crate::{Observer, PipelineError, garment::Garment};
 
@@ -42,7 +45,8 @@ impl Baking<'_> {
         let mut mover = Mover::new(&outfit, self.options.blend, self.options.skinning);
         let key = Key::new(self.avatar, self.fabrics, self.motion, self.options)?;
         let mut checkpoints = Checkpoints::new(self.folder, key.clone(), self.options.checkpoint_every);
-        let (begun, said) = self.unfinished(&mut mover, &key)?;
+        let (begun, mut said) = self.unfinished(&mut mover, &key)?;
+        said.extend(self.tangled());
         let lead_in = LeadIn::of(self.motion, &self.avatar.skeleton);
         let (mut caches, done) = match begun {
             Some((caches, frames)) => (caches, frames),
@@ -61,13 +65,16 @@ impl Baking<'_> {
             let moved = mover.frame(&poses[k.saturating_sub(1)], &poses[k], self.motion.frame_time);
             moved.map_err(|e| wrong(&e))?;
             let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
+            self.check(mover.layers(), k)?;
             mover.look();
             caches.add(mover.layers())?;
-            report.frames.push(FrameReport::of(&outfit, mover.layers(), mover.crossing(), milliseconds));
+            let of_frame = FrameReport::of(&outfit, mover.layers(), mover.crossing(), milliseconds);
+            report.frames.push(FrameReport { jumped: mover.jumped(), ..of_frame });
             checkpoints.at(&mut caches, &mover, &report.frames, k + 1 == count)?;
             self.observer.at((k + 1) as f32 / count as f32);
         }
-        self.finish(caches.written()?, &mut report, lead_in.as_ref())?;
+        report.sum_up();
+        self.finish(caches.written()?, &outfit, &mut report, lead_in.as_ref())?;
         checkpoints.clear()?;
         Ok((report, said))
     }
@@ -100,6 +107,33 @@ impl Baking<'_> {
         Ok((Some((caches, frames)), vec![said]))
     }
 
+    /// What is to be said of garments that cross themselves before they are moved.
+    fn tangled(&self) -> Option<String> {
+        let pairs = |l: &AvatarLayer| self_crossings(&l.mesh, &Bvh::new(&l.mesh.positions, &l.mesh.triangles)).len();
+        let garments = self.avatar.layers.iter().skip(1).map(|l| (l.name.as_str(), pairs(l)));
+        let tangled: Vec<String> =
+            garments.filter(|(_, pairs)| *pairs > 0).map(|(name, pairs)| format!("{name} ({pairs})")).collect();
+        let (which, motion) = (tangled.join(", "), &self.motion.name);
+        (!tangled.is_empty()).then(|| {
+            format!(
+                "motion {motion}: garments cross themselves as they were scanned, at so many pairs of triangles: {which}; they \
+                 are parted where there is room, and what is left moves as one"
+            )
+        })
+    }
+
+    /// Refuses a frame with places that are no numbers: no file must hold them.
+    fn check(&self, layers: &[Vec<Point3<f32>>], frame: usize) -> Result<(), PipelineError> {
+        let broken = |layer: &Vec<Point3<f32>>| !layer.iter().all(|p| p.coords.iter().all(|c| c.is_finite()));
+        let Some(k) = layers.iter().position(broken) else { return Ok(()) };
+        let (name, motion) = (&self.avatar.layers[k].name, &self.motion.name);
+        let reason = format!(
+            "in frame {frame} of the motion {motion} the layer {name} has no place any more; try another fabric, a slower \
+             motion or `--blend skinning`"
+        );
+        Err(PipelineError::refused(self.folder, reason))
+    }
+
     /// Names and numbers of vertices of the layers.
     fn sizes(&self) -> Vec<(&str, usize)> {
         self.avatar.layers.iter().map(|l| (l.name.as_str(), l.mesh.positions.len())).collect()
@@ -109,10 +143,10 @@ impl Baking<'_> {
     fn finish(
         &self,
         written: Written,
+        outfit: &Outfit,
         report: &mut AnimationReport,
         lead_in: Option<&LeadIn>,
     ) -> Result<(), PipelineError> {
-        report.sum_up();
         let points: Vec<usize> = self.sizes().iter().map(|n| n.1).collect();
         let mut cached = written.open(&points)?;
         if let Some(lead_in) = lead_in {
@@ -121,7 +155,13 @@ impl Baking<'_> {
         let glb = playable::glb(self.avatar, self.motion, &mut cached, self.folder)?;
         let (avatar, motion, folder) = (self.avatar, self.motion, self.folder);
         let pictures = Pictures { avatar, motion, cached: &mut cached, folder }.files(report)?;
-        written.finish(&[("motion.glb", glb)].into_iter().chain(pictures).collect::<Vec<_>>(), report)
+        let mut files: Vec<(&str, Vec<u8>)> = [("motion.glb", glb)].into_iter().chain(pictures).collect();
+        if self.options.compare {
+            let (variants, drawn) = variants::compare(self, outfit, lead_in, &mut cached, report)?;
+            report.variants = Some(variants);
+            files.extend(drawn);
+        }
+        written.finish(&files, report)
     }
 }
 

@@ -125,6 +125,8 @@ impl Written {
     pub fn finish(self, files: &[(&str, Vec<u8>)], report: &AnimationReport) -> Result<(), PipelineError> {
         let report_path = self.folder.join("report.json");
         remove(&report_path)?;
+        // Of an earlier run that compared: it would no longer belong to the rest.
+        ["variants.gif", "variants.png"].iter().try_for_each(|name| remove(&self.folder.join(name)))?;
         for (part, whole) in self.layers {
             fs::rename(&part, &whole).map_err(|e| PipelineError::io(&part, e))?;
         }

@@ -18,6 +18,11 @@ const WARM_UP: (f64, f64, f64) = (1.0, 0.5, 0.1);
 /// so often: a walk at 30 frames a second moves a hand by 60 mm.
 const LONG_WAY: f64 = 0.12;
 const MOST_PARTS: f64 = 8.0;
+/// The same for a whole body that travels, metres, and for time, seconds: a motion of a frame a second is moved through in between.
+const LONG_TRAVEL: f64 = 0.3;
+const LONGEST_PART: f64 = 0.1;
+/// Nobody gets faster than this, m/s: a sprinter runs at 12.4. A motion that is faster jumps from one place to another.
+const FASTEST: f64 = 15.0;
 /// Seconds before the first frame of an endless motion in which the layers are kept apart: twice what corrections last.
 const APART_BEFORE: f64 = 0.8;
 
@@ -28,13 +33,20 @@ pub(super) struct Mover<'a> {
     blend: Blend,
     /// Pairs of triangles of different layers that cross now.
     crossing: usize,
+    jumped: bool,
 }
 
 impl<'a> Mover<'a> {
     /// The outfit in its first pose, at rest.
     pub fn new(outfit: &'a Outfit, blend: Blend, skinning: Skinning) -> Self {
         let meshes: Vec<_> = outfit.layers().iter().map(|l| &l.mesh).collect();
-        Self { wearer: Wearer::new(outfit, blend, skinning), apart: Apart::new(&meshes), blend, crossing: 0 }
+        Self {
+            wearer: Wearer::new(outfit, blend, skinning),
+            apart: Apart::new(&meshes),
+            blend,
+            crossing: 0,
+            jumped: false,
+        }
     }
 
     /// Vertices of all layers, where the last frame left them.
@@ -53,7 +65,14 @@ impl<'a> Mover<'a> {
         if self.blend == Blend::Skinning {
             return self.wearer.advance(pose, seconds);
         }
-        let parts = (self.wearer.way_to(pose) / LONG_WAY).ceil().clamp(1.0, MOST_PARTS) as usize;
+        self.jumped = self.wearer.travel_to(pose) > FASTEST * seconds;
+        let mut from = from.clone();
+        if self.jumped {
+            self.wearer.carry_to(pose);
+            from = self.wearer.pose().clone();
+        }
+        let way = (self.wearer.way_to(pose) / LONG_WAY).max(self.wearer.travel_to(pose) / LONG_TRAVEL);
+        let parts = way.ceil().clamp(1.0, MOST_PARTS.max(seconds / LONGEST_PART)) as usize;
         for k in 1..=parts {
             self.wearer.advance(&from.interpolated(pose, k as f64 / parts as f64), seconds / parts as f64)?;
             if self.blend == Blend::Anchored {
@@ -64,6 +83,11 @@ impl<'a> Mover<'a> {
             }
         }
         Ok(())
+    }
+
+    /// True where the person was elsewhere in the last frame than anybody gets in its time: cloth was carried there.
+    pub fn jumped(&self) -> bool {
+        self.jumped
     }
 
     /// Counts what crosses where nothing keeps the layers apart.

@@ -18,6 +18,8 @@ pub struct AnimateOptions {
     pub blend: Blend,
     /// How skin weights are blended.
     pub skinning: Skinning,
+    /// Whether the motion is also made by each of the other blends, for pictures and times side by side.
+    pub compare: bool,
     /// A file of fabrics, and of which garment is made of what.
     pub fabrics: Option<PathBuf>,
     /// Settings of the stages.
@@ -33,6 +35,7 @@ impl Default for AnimateOptions {
             fps: 30.0,
             blend: Blend::default(),
             skinning: Skinning::Linear,
+            compare: false,
             fabrics: None,
             settings: None,
             checkpoint_every: Duration::from_secs(2),

@@ -7,7 +7,7 @@ use toile_animation::blend::{Blend, Outfit};
 use toile_character::Motion;
 use toile_geometry::statistics::{Rank, quantile_by};
 
-use super::{endless::Endless, options::AnimateOptions};
+use super::{endless::Endless, options::AnimateOptions, variants::Variant};
 use crate::garment::Garment;
 
 /// `report.json` of a motion.
@@ -33,6 +33,9 @@ pub struct AnimationReport {
     pub ms_a_frame: [f64; 2],
     /// Pairs of triangles of different layers that cross, mean over the frames.
     pub crossing_mean: f64,
+    /// Where the blends were compared: each of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variants: Option<Vec<Variant>>,
     /// The frames.
     pub frames: Vec<FrameReport>,
 }
@@ -44,6 +47,9 @@ pub struct FrameReport {
     pub ms: f64,
     /// Pairs of triangles of different layers that cross.
     pub crossing: usize,
+    /// True where the motion jumped to here from somewhere else, and cloth was carried along.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub jumped: bool,
     /// Stretch of each layer's edges against the scan that 99 of 100 stay below.
     pub stretch_p99: Vec<f32>,
 }
@@ -61,7 +67,7 @@ impl FrameReport {
             let place = (all.len() * 99 / 100).min(all.len().saturating_sub(1));
             if all.is_empty() { 1.0 } else { *all.select_nth_unstable_by(place, f32::total_cmp).1 }
         };
-        Self { ms, crossing, stretch_p99: layers.par_iter().enumerate().map(stretch).collect() }
+        Self { ms, crossing, jumped: false, stretch_p99: layers.par_iter().enumerate().map(stretch).collect() }
     }
 }
 
@@ -77,6 +83,7 @@ impl AnimationReport {
             endless: None,
             ms_a_frame: [0.0; 2],
             crossing_mean: 0.0,
+            variants: None,
             frames: Vec::with_capacity(motion.poses.len()),
         }
     }
@@ -97,6 +104,20 @@ impl AnimationReport {
 
     /// Sentences for the operator.
     pub(super) fn warnings(&self) -> Vec<String> {
+        let mut out = self.crossings();
+        let jumps: Vec<String> =
+            (0..self.frames.len()).filter(|&f| self.frames[f].jumped).map(|f| f.to_string()).collect();
+        if let Some(first) = jumps.first() {
+            let more = if jumps.len() > 1 { format!(" and {} more", jumps.len() - 1) } else { String::new() };
+            out.push(format!(
+                "motion {}: it jumps to another place at frame {first}{more}, faster than anybody runs; cloth was carried along",
+                self.motion
+            ));
+        }
+        out
+    }
+
+    fn crossings(&self) -> Vec<String> {
         let crossing = self.frames.iter().filter(|f| f.crossing > 0).count();
         if crossing == 0 || self.blend != Blend::Anchored {
             return Vec::new();

@@ -43,6 +43,9 @@ pub struct Animate {
     /// What moves the garments
     #[arg(long, value_enum, default_value_t = Way::Anchored)]
     blend: Way,
+    /// Move the garments by all blends, and show them side by side: variants.gif, variants.png, and their times in report.json
+    #[arg(long)]
+    compare: bool,
     /// How skin weights are blended
     #[arg(long, value_enum, default_value_t = Weights::Linear)]
     skinning: Weights,
@@ -101,6 +104,7 @@ impl Animate {
                 Weights::Log => Skinning::Log,
                 Weights::Hybrid => Skinning::Hybrid,
             },
+            compare: self.compare,
             fabrics: self.fabrics.clone(),
             settings: self.settings.clone(),
             ..AnimateOptions::default()
