@@ -5,6 +5,7 @@ mod caches;
 mod checkpoint;
 mod endless;
 mod fabrics;
+mod inputs;
 mod mover;
 mod options;
 mod pictures;
@@ -21,7 +22,7 @@ use toile_capture::printable;
 use toile_character::{BodyModel, Motion};
 use toile_garments::ExtractionReport;
 
-use self::{baking::Baking, fabrics::Fabrics};
+use self::{fabrics::Fabrics, inputs::Baking};
 pub use self::{options::AnimateOptions, report::AnimationReport};
 use crate::{
     Goal, Observer, Options, PipelineError, Record, Run,

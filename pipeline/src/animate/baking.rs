@@ -1,11 +1,10 @@
 //! The frames of a motion, one after the other into the caches; an earlier run that was killed is gone on with.
 
-use std::{path::Path, time::Instant};
+use std::time::Instant;
 
 use nalgebra::Point3;
 use toile_animation::blend::{Blend, Outfit, OutfitLayer};
 use toile_avatar::{Avatar, AvatarLayer};
-use toile_character::Motion;
 use toile_cloth::Fabric;
 use toile_geometry::{bvh::Bvh, intersection::self_crossings};
 
@@ -13,26 +12,14 @@ use super::{
     caches::{Caches, Written},
     checkpoint::{self, Checkpoints, Key, Left},
     endless::LeadIn,
+    inputs::Baking,
     mover::Mover,
-    options::AnimateOptions,
     pictures::Pictures,
     playable,
     report::{AnimationReport, FrameReport},
     variants,
 };
-use crate::{Observer, PipelineError, garment::Garment};
-
-/// A motion that is to be written.
-pub(super) struct Baking<'a> {
-    pub avatar: &'a Avatar,
-    pub garments: &'a [Garment],
-    /// What each layer is made of.
-    pub fabrics: &'a [Fabric],
-    pub motion: &'a Motion,
-    pub options: &'a AnimateOptions,
-    pub folder: &'a Path,
-    pub observer: &'a dyn Observer,
-}
+use crate::PipelineError;
 
 impl Baking<'_> {
     /// Writes all files of the motion. Returns the report, and what the operator should know beside it.

@@ -1,10 +1,9 @@
 //! Motions that go round: what comes before their first frame, so that the last one's cloth flows into it.
 
-use serde::{Deserialize, Serialize};
 use toile_animation::turn_of_loop;
 use toile_character::{Motion, Pose, Skeleton};
 
-use super::caches::Cached;
+use super::{caches::Cached, report::Endless};
 use crate::PipelineError;
 
 /// Seconds of the motion that are played before its first frame: cloth that swings on springs of 5 rad/s, damped by 7/s, has forgotten how
@@ -17,15 +16,6 @@ pub(super) struct LeadIn {
     pub poses: Vec<Pose>,
     /// `last_from_first`: where a round ends, seen from where it began.
     around: nalgebra::Isometry3<f64>,
-}
-
-/// How well a motion that goes round closes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Endless {
-    /// Seconds of it that were played before the first frame.
-    pub seconds_before: f64,
-    /// Mean and largest distance of the garments' vertices between the last frame and the first, millimetres.
-    pub gap_mm: [f64; 2],
 }
 
 impl LeadIn {

@@ -11,7 +11,7 @@ use toile_character::{Motion, Pose, Skeleton, SkinWeights};
 use toile_geometry::Mesh;
 use toile_render::{Drawn, RenderError, RgbImage, View, film, picture, png, sheet};
 
-use super::{baking::Baking, caches::Cached, report::AnimationReport};
+use super::{caches::Cached, inputs::Baking, report::AnimationReport};
 use crate::PipelineError;
 
 /// Pictures of the film at most, and milliseconds that each is shown at least.

@@ -7,7 +7,7 @@ use toile_animation::blend::{Blend, Outfit};
 use toile_character::Motion;
 use toile_geometry::statistics::{Rank, quantile_by};
 
-use super::{endless::Endless, options::AnimateOptions, variants::Variant};
+use super::options::AnimateOptions;
 use crate::garment::Garment;
 
 /// `report.json` of a motion.
@@ -52,6 +52,26 @@ pub struct FrameReport {
     pub jumped: bool,
     /// Stretch of each layer's edges against the scan that 99 of 100 stay below.
     pub stretch_p99: Vec<f32>,
+}
+
+/// How well a motion that goes round closes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Endless {
+    /// Seconds of it that were played before the first frame.
+    pub seconds_before: f64,
+    /// Mean and largest distance of the garments' vertices between the last frame and the first, millimetres.
+    pub gap_mm: [f64; 2],
+}
+
+/// What one blend does in a motion.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Variant {
+    /// The blend.
+    pub blend: Blend,
+    /// Milliseconds a frame: median, and nineteen of twenty are below.
+    pub ms_a_frame: [f64; 2],
+    /// Pairs of triangles of different layers that cross, mean over the frames.
+    pub crossing_mean: f64,
 }
 
 impl FrameReport {

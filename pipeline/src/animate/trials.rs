@@ -14,7 +14,7 @@ use toile_character::{BodyModel, Joint, JointNaming, Motion, Pose, SkinWeights};
 use toile_cloth::Fabric;
 use toile_geometry::Mesh;
 
-use super::{baking::Baking, options::AnimateOptions, report::AnimationReport};
+use super::{inputs::Baking, options::AnimateOptions, report::AnimationReport};
 use crate::{PipelineError, observer::Silent};
 
 /// A tube of 24 by 12 vertices around the hips, from the waist to above the knees.

@@ -2,34 +2,22 @@
 
 use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
 use toile_animation::blend::{Blend, Outfit};
 use toile_geometry::statistics::{Rank, quantile_by};
 use toile_render::{RgbImage, film, png, sheet};
 
 use super::{
-    baking::Baking,
     caches::Cached,
     endless::LeadIn,
+    inputs::Baking,
     mover::Mover,
     pictures::{FILM_LIMIT, film_frames, portrait},
-    report::AnimationReport,
+    report::{AnimationReport, Variant},
 };
 use crate::PipelineError;
 
 /// Moments that `variants.png` shows.
 const MOMENTS: usize = 4;
-
-/// What one blend does in a motion.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Variant {
-    /// The blend.
-    pub blend: Blend,
-    /// Milliseconds a frame: median, and nineteen of twenty are below.
-    pub ms_a_frame: [f64; 2],
-    /// Pairs of triangles of different layers that cross, mean over the frames.
-    pub crossing_mean: f64,
-}
 
 /// Files by name.
 type Files = Vec<(&'static str, Vec<u8>)>;
