@@ -144,14 +144,12 @@ fn fabric_of(
             _ => None,
         };
         let positive = k < 2;
-        match number.filter(|v| v.is_finite() && (*v > 0.0 || !positive && *v == 0.0)) {
-            Some(number) => values[k] = Some(number),
-            None => {
-                let range = if positive { "a positive number" } else { "a number of at least 0" };
-                let found = number.map_or("no number".into(), |v| v.to_string());
-                return Err(wrong(span.start, format!("{name} is {found}; it must be {range}")));
-            }
-        }
+        let Some(number) = number.filter(|v| v.is_finite() && (*v > 0.0 || !positive && *v == 0.0)) else {
+            let range = if positive { "a positive number" } else { "a number of at least 0" };
+            let found = number.map_or("no number".into(), |v| v.to_string());
+            return Err(wrong(span.start, format!("{name} is {found}; it must be {range}")));
+        };
+        values[k] = Some(number);
     }
     if let Some(k) = values.iter().position(Option::is_none) {
         let reason = format!("{} is missing; a fabric has {}, or `like` and what differs", PROPERTIES[k], known());

@@ -35,13 +35,12 @@ impl Baking<'_> {
         let (begun, mut said) = self.unfinished(&mut mover, &key)?;
         said.extend(self.tangled());
         let lead_in = LeadIn::of(self.motion, &self.avatar.skeleton);
-        let (mut caches, done) = match begun {
-            Some((caches, frames)) => (caches, frames),
-            None => {
-                checkpoints.clear()?;
-                mover.start(&self.avatar.pose0, self.motion, lead_in.as_ref()).map_err(|e| wrong(&e))?;
-                (Caches::begin(self.folder, &self.sizes(), self.motion.poses.len())?, Vec::new())
-            }
+        let (mut caches, done) = if let Some(begun) = begun {
+            begun
+        } else {
+            checkpoints.clear()?;
+            mover.start(&self.avatar.pose0, self.motion, lead_in.as_ref()).map_err(|e| wrong(&e))?;
+            (Caches::begin(self.folder, &self.sizes(), self.motion.poses.len())?, Vec::new())
         };
         let mut report = AnimationReport::new(self.motion, self.options, self.garments);
         report.physical_shares = (self.options.blend == Blend::Seed).then(|| outfit.physical_shares());
