@@ -7,7 +7,7 @@
 //! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
 //! - [`foot_figures`]: how well the feet of a motion stand, measured on the body's surface;
 //! - [`springs`]: chains of joints on which loose parts swing in other programs;
-//! - [`resample`], [`close_loop`]: other rates, endless motions.
+//! - [`resample`], [`close_loop`], [`turn_of_loop`]: other rates, endless motions.
 //!
 //! ```
 //! use toile_animation::{RetargetSettings, retarget, shipped_walk};
@@ -37,5 +37,7 @@ pub use bvh::Bvh;
 pub use error::AnimationError;
 pub use foot_figures::{FootFigures, foot_figures};
 pub use footing::Footing;
-pub use retarget::{RetargetReport, RetargetSettings, Retargeted, close_loop, resample, retarget, retarget_body};
+pub use retarget::{
+    RetargetReport, RetargetSettings, Retargeted, close_loop, resample, retarget, retarget_body, turn_of_loop,
+};
 pub use walk::{SHIPPED_WALK, WalkSettings, shipped_walk, walk};

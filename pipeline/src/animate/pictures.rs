@@ -7,11 +7,11 @@ use std::{
 
 use nalgebra::Point3;
 use toile_avatar::Avatar;
-use toile_character::{Motion, Pose, SkinWeights};
+use toile_character::{Motion, Pose, Skeleton, SkinWeights};
 use toile_geometry::Mesh;
 use toile_render::{Drawn, RenderError, RgbImage, View, film, picture, png, sheet};
 
-use super::{caches::Cached, report::AnimationReport};
+use super::{caches::Cached, inputs::Baking, report::AnimationReport};
 use crate::PipelineError;
 
 /// Pictures of the film at most, and milliseconds that each is shown at least.
@@ -20,8 +20,8 @@ const SHORTEST: f64 = 80.0;
 /// Size of a picture of the film and of a still, pixels.
 const FILM: (u32, u32) = (240, 320);
 const STILL: (u32, u32) = (300, 400);
-/// Bytes of the film at most.
-const LIMIT: usize = 3_000_000;
+/// Bytes of a film at most.
+pub(super) const FILM_LIMIT: usize = 3_000_000;
 /// Directions from which a still is seen, radians around +Y.
 const HEADINGS: [(f64, &str); 5] =
     [(0.0, "front"), (0.8, "left front"), (FRAC_PI_2, "left"), (PI, "back"), (-0.8, "right front")];
@@ -51,16 +51,14 @@ impl Pictures<'_> {
 
     fn film(&mut self) -> Result<Vec<u8>, PipelineError> {
         let wrong = of_folder(self.folder);
-        let count = self.motion.poses.len();
-        let frame_time = 1e3 * self.motion.frame_time;
-        let every = (SHORTEST / frame_time).ceil().max((count as f64 / PICTURES as f64).ceil()).max(1.0) as usize;
+        let (shown, milliseconds) = film_frames(self.motion);
         let mut pictures = Vec::new();
-        for frame in (0..count).step_by(every) {
+        for frame in shown {
             let layers = self.layers(frame)?;
             let drawn: Vec<Drawn> = layers.iter().map(Drawn::colored).collect();
             pictures.push(drawn_from(&drawn, &self.view(frame, HEADINGS[1].0), FILM).map_err(wrong)?);
         }
-        film::gif(&pictures, (frame_time * every as f64).round() as u32, LIMIT).map_err(wrong)
+        film::gif(&pictures, milliseconds, FILM_LIMIT).map_err(wrong)
     }
 
     fn stills(&mut self, frame: usize) -> Result<Vec<u8>, PipelineError> {
@@ -104,19 +102,44 @@ impl Pictures<'_> {
         self.avatar.layers.iter().map(|l| of(&l.mesh, &l.weights)).collect()
     }
 
-    /// The view from a heading that follows the hips over the ground.
     fn view(&self, frame: usize, heading: f64) -> View {
-        let skeleton = &self.avatar.skeleton;
-        let height = |pose: &Pose| {
-            let joints = pose.joint_positions(skeleton);
-            joints.iter().map(|p| p.y as f32).fold(f32::MIN, f32::max)
-        };
-        let tall = height(&Pose::identity()).max(0.5);
-        let hips = self.motion.poses[frame].joint_positions(skeleton)[0].cast::<f32>();
-        let low = Point3::new(hips.x - WIDTH * tall, hips.y - BELOW * tall, hips.z - WIDTH * tall);
-        let high = Point3::new(hips.x + WIDTH * tall, low.y + HEIGHT * tall, hips.z + WIDTH * tall);
-        View::around(heading, 0.08).fitted((low, high))
+        view(&self.avatar.skeleton, &self.motion.poses[frame], heading)
     }
+}
+
+/// The frames of a motion that its film shows, and milliseconds that each is shown.
+pub(super) fn film_frames(motion: &Motion) -> (Vec<usize>, u32) {
+    let count = motion.poses.len();
+    let frame_time = 1e3 * motion.frame_time;
+    let every = (SHORTEST / frame_time).ceil().max((count as f64 / PICTURES as f64).ceil()).max(1.0);
+    ((0..count).step_by(every as usize).collect(), (frame_time * every).round() as u32)
+}
+
+/// The layers at `positions`, which are theirs in a frame, as a picture of the film.
+pub(super) fn portrait(
+    baking: &Baking,
+    positions: &[Vec<Point3<f32>>],
+    frame: usize,
+) -> Result<RgbImage, PipelineError> {
+    let mesh = |(layer, positions): (&toile_avatar::AvatarLayer, &Vec<Point3<f32>>)| {
+        let mut mesh = Mesh { positions: positions.clone(), normals: Vec::new(), ..layer.mesh.clone() };
+        mesh.recompute_normals();
+        mesh
+    };
+    let layers: Vec<Mesh> = baking.avatar.layers.iter().zip(positions).map(mesh).collect();
+    let drawn: Vec<Drawn> = layers.iter().map(Drawn::colored).collect();
+    let view = view(&baking.avatar.skeleton, &baking.motion.poses[frame], HEADINGS[1].0);
+    drawn_from(&drawn, &view, FILM).map_err(of_folder(baking.folder))
+}
+
+/// The view from a heading that follows the hips over the ground.
+fn view(skeleton: &Skeleton, pose: &Pose, heading: f64) -> View {
+    let height = |pose: &Pose| pose.joint_positions(skeleton).iter().map(|p| p.y as f32).fold(f32::MIN, f32::max);
+    let tall = height(&Pose::identity()).max(0.5);
+    let hips = pose.joint_positions(skeleton)[0].cast::<f32>();
+    let low = Point3::new(hips.x - WIDTH * tall, hips.y - BELOW * tall, hips.z - WIDTH * tall);
+    let high = Point3::new(hips.x + WIDTH * tall, low.y + HEIGHT * tall, hips.z + WIDTH * tall);
+    View::around(heading, 0.08).fitted((low, high))
 }
 
 fn of_folder(folder: &Path) -> impl Fn(RenderError) -> PipelineError + Copy + '_ {

@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toile_animation::blend::{Blend, Outfit};
 use toile_character::Motion;
 use toile_geometry::statistics::{Rank, quantile_by};
@@ -21,25 +21,57 @@ pub struct AnimationReport {
     pub blend: Blend,
     /// How skin weights were blended.
     pub skinning: &'static str,
+    /// For the blend `seed`, the weight w_p of the physics in each garment: one, or two for a skirt (what lies on the body, what hangs).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical_shares: Option<Vec<Vec<f64>>>,
     /// Garments, inside to outside.
     pub garments: Vec<String>,
+    /// For a motion that goes round: what was played before it, and how well it closes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub endless: Option<Endless>,
     /// Milliseconds a frame: median, and nineteen of twenty are below.
     pub ms_a_frame: [f64; 2],
     /// Pairs of triangles of different layers that cross, mean over the frames.
     pub crossing_mean: f64,
+    /// Where the blends were compared: each of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variants: Option<Vec<Variant>>,
     /// The frames.
     pub frames: Vec<FrameReport>,
 }
 
 /// One frame.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FrameReport {
     /// Milliseconds.
     pub ms: f64,
     /// Pairs of triangles of different layers that cross.
     pub crossing: usize,
+    /// True where the motion jumped to here from somewhere else, and cloth was carried along.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub jumped: bool,
     /// Stretch of each layer's edges against the scan that 99 of 100 stay below.
     pub stretch_p99: Vec<f32>,
+}
+
+/// How well a motion that goes round closes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Endless {
+    /// Seconds of it that were played before the first frame.
+    pub seconds_before: f64,
+    /// Mean and largest distance of the garments' vertices between the last frame and the first, millimetres.
+    pub gap_mm: [f64; 2],
+}
+
+/// What one blend does in a motion.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Variant {
+    /// The blend.
+    pub blend: Blend,
+    /// Milliseconds a frame: median, and nineteen of twenty are below.
+    pub ms_a_frame: [f64; 2],
+    /// Pairs of triangles of different layers that cross, mean over the frames.
+    pub crossing_mean: f64,
 }
 
 impl FrameReport {
@@ -55,7 +87,7 @@ impl FrameReport {
             let place = (all.len() * 99 / 100).min(all.len().saturating_sub(1));
             if all.is_empty() { 1.0 } else { *all.select_nth_unstable_by(place, f32::total_cmp).1 }
         };
-        Self { ms, crossing, stretch_p99: layers.par_iter().enumerate().map(stretch).collect() }
+        Self { ms, crossing, jumped: false, stretch_p99: layers.par_iter().enumerate().map(stretch).collect() }
     }
 }
 
@@ -66,9 +98,12 @@ impl AnimationReport {
             fps: 1.0 / motion.frame_time,
             blend: options.blend,
             skinning: options.skinning.name(),
+            physical_shares: None,
             garments: garments.iter().map(|g| g.name.clone()).collect(),
+            endless: None,
             ms_a_frame: [0.0; 2],
             crossing_mean: 0.0,
+            variants: None,
             frames: Vec::with_capacity(motion.poses.len()),
         }
     }
@@ -89,8 +124,22 @@ impl AnimationReport {
 
     /// Sentences for the operator.
     pub(super) fn warnings(&self) -> Vec<String> {
+        let mut out = self.crossings();
+        let jumps: Vec<String> =
+            (0..self.frames.len()).filter(|&f| self.frames[f].jumped).map(|f| f.to_string()).collect();
+        if let Some(first) = jumps.first() {
+            let more = if jumps.len() > 1 { format!(" and {} more", jumps.len() - 1) } else { String::new() };
+            out.push(format!(
+                "motion {}: it jumps to another place at frame {first}{more}, faster than anybody runs; cloth was carried along",
+                self.motion
+            ));
+        }
+        out
+    }
+
+    fn crossings(&self) -> Vec<String> {
         let crossing = self.frames.iter().filter(|f| f.crossing > 0).count();
-        if crossing == 0 || self.blend == Blend::Skinning {
+        if crossing == 0 || self.blend != Blend::Anchored {
             return Vec::new();
         }
         let (frames, mean) = (self.frames.len(), self.crossing_mean);
