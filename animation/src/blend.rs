@@ -13,14 +13,14 @@
 //! [`Blend::Skinning`] ends after the first step. Whoever keeps the layers apart at full resolution afterwards tells the wearer
 //! where they came to lie ([`Wearer::correct`]): the next frame starts from there.
 
-mod anchors;
-mod layer;
-mod loft;
-mod outfit;
-mod proxy;
-mod ride;
+pub(crate) mod anchors;
+pub(crate) mod layer;
+pub(crate) mod loft;
+pub(crate) mod outfit;
+pub(crate) mod proxy;
+pub(crate) mod ride;
 mod room;
-mod squeeze;
+pub(crate) mod squeeze;
 mod wearer;
 
 pub use layer::OutfitLayer;

@@ -4,6 +4,7 @@
 //! - [`retarget`]: any of the usual skeletons carried onto the target's 52 joints;
 //! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
 //! - [`blend`]: the layers of an outfit in motion, by skinning and by cloth;
+//! - [`realtime`]: the same frame by frame as a live object, fast enough for a screen;
 //! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
 //! - [`resample`], [`close_loop`]: other rates, endless motions.
 //!
@@ -24,6 +25,7 @@ pub mod blend;
 pub mod bvh;
 pub mod decomposition;
 mod error;
+pub mod realtime;
 mod retarget;
 mod skeleton;
 mod walk;
