@@ -10,17 +10,21 @@
 //!
 //! Before all of that, [`Clothed::make_room`] holds the arms of the motion as far from the body as the clothes between them need.
 //!
-//! [`Blend::Skinning`] ends after the first step. Whoever keeps the layers apart at full resolution afterwards tells the wearer
+//! [`Blend::Skinning`] ends after the first step. [`Blend::Physics`] and [`Blend::Seed`] leave out the second, simulate sheets that hang
+//! by themselves (`hung`), and take all of their motion, or the share of it that the seed's eq. 9 gives (`shares`). Whoever keeps the layers apart at full resolution afterwards tells the wearer
 //! where they came to lie ([`Wearer::correct`]): the next frame starts from there.
 
 pub(crate) mod anchors;
+mod hung;
 pub(crate) mod layer;
 pub(crate) mod loft;
 pub(crate) mod outfit;
 pub(crate) mod proxy;
 pub(crate) mod ride;
 mod room;
+mod shares;
 pub(crate) mod squeeze;
+mod state;
 mod wearer;
 
 pub use layer::OutfitLayer;
@@ -36,7 +40,31 @@ use serde::{Deserialize, Serialize};
 pub enum Blend {
     /// By skin weights alone.
     Skinning,
+    /// Cloth under its own weight, held by nothing but contact with the body, friction, and waistbands.
+    Physics,
+    /// Skinning and physics mixed by one weight a garment, two for a skirt (Hu et al. 2017, eq. 8 and 9).
+    Seed,
     /// Cloth that is held where it lies on the body, and moves freely elsewhere.
     #[default]
     Anchored,
+}
+
+impl Blend {
+    /// All of them, from the simplest on.
+    pub const ALL: [Self; 4] = [Self::Skinning, Self::Physics, Self::Seed, Self::Anchored];
+
+    /// Its name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Skinning => "skinning",
+            Self::Physics => "physics",
+            Self::Seed => "seed",
+            Self::Anchored => "anchored",
+        }
+    }
+
+    /// True where sheets hang by themselves, tied to nothing but waistbands.
+    fn hangs(self) -> bool {
+        matches!(self, Self::Physics | Self::Seed)
+    }
 }

@@ -6,7 +6,7 @@
 //! - [`blend`]: the layers of an outfit in motion, by skinning and by cloth;
 //! - [`realtime`]: the same frame by frame as a live object, fast enough for a screen;
 //! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
-//! - [`resample`], [`close_loop`]: other rates, endless motions.
+//! - [`resample`], [`close_loop`], [`turn_of_loop`]: other rates, endless motions.
 //!
 //! ```
 //! use toile_animation::{RetargetSettings, retarget, shipped_walk};
@@ -32,5 +32,5 @@ mod walk;
 
 pub use bvh::Bvh;
 pub use error::AnimationError;
-pub use retarget::{RetargetReport, RetargetSettings, Retargeted, close_loop, resample, retarget};
+pub use retarget::{RetargetReport, RetargetSettings, Retargeted, close_loop, resample, retarget, turn_of_loop};
 pub use walk::{SHIPPED_WALK, WalkSettings, shipped_walk, walk};

@@ -44,15 +44,15 @@ pub struct Live<'a> {
 }
 
 impl<'a> Live<'a> {
-    /// The outfit in its first pose, at rest.
+    /// The outfit in its first pose, at rest; skin weights are blended in this `way`.
     ///
     /// # Errors
     /// [`AnimationError::Motion`] where a garment lies over no body, or cannot be skinned.
-    pub fn new(outfit: &'a Outfit) -> Result<Self, AnimationError> {
+    pub fn new(outfit: &'a Outfit, way: Skinning) -> Result<Self, AnimationError> {
         let meshes: Vec<&Mesh> = outfit.layers.iter().map(|l| &l.mesh).collect();
         Ok(Self {
-            carried: Carried::new(outfit),
-            simulation: Simulation::new(outfit)?,
+            carried: Carried::new(outfit, way),
+            simulation: Simulation::new(outfit, way)?,
             order: Order::new(&meshes),
             layers: meshes.iter().map(|m| m.positions.clone()).collect(),
             outfit,
@@ -88,15 +88,17 @@ impl<'a> Live<'a> {
 
 /// The layers where the skeleton carries them, pressed where parts of the body come near each other.
 struct Carried {
+    way: Skinning,
     posing: Posing,
     skins: Vec<PosedSkin>,
     press: Press,
 }
 
 impl Carried {
-    fn new(outfit: &Outfit) -> Self {
+    fn new(outfit: &Outfit, way: Skinning) -> Self {
         let body = &outfit.layers[0].mesh;
         Self {
+            way,
             posing: Posing::new(&outfit.skeleton, &outfit.pose0),
             skins: outfit.layers.iter().map(|_| PosedSkin::default()).collect(),
             press: Press::new(&outfit.columns, &body.positions, &body.vertex_normals()),
@@ -104,11 +106,11 @@ impl Carried {
     }
 
     fn advance(&mut self, outfit: &Outfit, pose: &Pose, layers: &mut [Vec<Point3<f32>>]) -> Result<(), AnimationError> {
-        let Self { posing, skins, press } = self;
+        let Self { way, posing, skins, press } = self;
         posing.set(pose);
         let moved = &posing.moved;
         skins.par_iter_mut().zip(&outfit.skinners).try_for_each(|(skin, skinner)| {
-            skinner.pose(moved, Skinning::Linear, skin).map_err(|e| AnimationError::Motion(e.to_string()))
+            skinner.pose(moved, *way, skin).map_err(|e| AnimationError::Motion(e.to_string()))
         })?;
         layers.iter_mut().zip(&*skins).for_each(|(layer, skin)| layer.copy_from_slice(&skin.positions));
         let skin = &skins[0];

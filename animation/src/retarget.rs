@@ -6,6 +6,7 @@
 
 mod calibration_pose;
 mod constants;
+mod endless;
 mod flat_foot;
 mod ground;
 mod looping;
@@ -18,6 +19,7 @@ mod turns;
 use serde::{Deserialize, Serialize};
 use toile_character::{Joint, Motion, Pose, Skeleton, feet::lift_out_of_floor};
 
+pub use endless::turn_of_loop;
 pub use looping::close_loop;
 pub use resample::resample;
 

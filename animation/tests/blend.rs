@@ -109,3 +109,43 @@ fn skin_that_meets_skin_gives_way() {
     println!("{rest} crossings at rest, {before} by weights, {after} pressed");
     assert!(before > rest + 50 && (after - rest) * 4 < before - rest, "{rest}, {before}, {after}");
 }
+
+#[test]
+fn the_seed_mixes_skinning_and_physics_by_its_weights() {
+    let (outfit, _) = outfit();
+    let shares = outfit.physical_shares();
+    assert!(shares.len() == 1 && shares[0].len() == 1 && (0.1..=0.5).contains(&shares[0][0]), "{shares:?}");
+    let run = |blend| {
+        let mut wearer = Wearer::new(&outfit, blend, Skinning::Linear);
+        let mut pose = Pose::identity();
+        for frame in 0..6 {
+            pose.translation.x = 0.04 * f64::from(frame);
+            wearer.advance(&pose, 1.0 / 30.0).unwrap();
+        }
+        wearer.layers().to_vec()
+    };
+    let [skinned, physical, seed] = [Blend::Skinning, Blend::Physics, Blend::Seed].map(run);
+    assert_eq!(seed[0], skinned[0], "the body is only skinned");
+    let w = shares[0][0] as f32;
+    let expected: Vec<Point3<f32>> = skinned[1].iter().zip(&physical[1]).map(|(l, p)| l + (p - l) * w).collect();
+    assert!(farthest(&seed[1], &expected) < 1e-5);
+    assert!(farthest(&physical[1], &skinned[1]) > 0.01, "physics is not skinning");
+}
+
+#[test]
+fn cloth_of_physics_alone_drops_but_a_waistband_holds_it() {
+    let (outfit, _) = outfit();
+    let mut wearer = Wearer::new(&outfit, Blend::Physics, Skinning::Linear);
+    for _ in 0..30 {
+        wearer.advance(&Pose::identity(), 1.0 / 30.0).unwrap();
+    }
+    let (now, scanned) = (&wearer.layers()[1], outfit.scanned(1));
+    assert!(now.iter().all(|p| p.coords.iter().all(|c| c.is_finite())));
+    let around = 72;
+    let waist = farthest(&now[..around], &scanned[..around]);
+    assert!(waist < 0.005, "the waistband slipped by {waist} m");
+    // The cone that was scanned is wider than its own weight lets it hang.
+    let width = |ring: &[Point3<f32>]| ring.iter().map(|p| p.x).fold(f32::MIN, f32::max);
+    let (hem_now, hem_then) = (width(&now[now.len() - around..]), width(&scanned[scanned.len() - around..]));
+    assert!(hem_now < hem_then - 0.005, "{hem_now} {hem_then}");
+}

@@ -34,6 +34,21 @@ impl<W: Write> PointCache<W> {
         Ok(Self { out, points, left: samples, bytes: Vec::with_capacity(points * 12) })
     }
 
+    /// Goes on with a cache of which `written` of its samples are in `out` already, the next behind them.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::InvalidInput`] where that are more than all.
+    pub fn go_on(out: W, points: usize, samples: u32, written: u32) -> io::Result<Self> {
+        let left = samples.checked_sub(written);
+        let left = left.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "more samples than all"))?;
+        Ok(Self { out, points, left, bytes: Vec::with_capacity(points * 12) })
+    }
+
+    /// Where the samples go.
+    pub fn out_mut(&mut self) -> &mut W {
+        &mut self.out
+    }
+
     /// Adds the next sample.
     ///
     /// # Errors

@@ -59,6 +59,11 @@ impl MovingSurface {
         }
     }
 
+    /// Where its vertices are, metres.
+    pub fn positions(&self) -> &[Point3<f32>] {
+        &self.now
+    }
+
     /// Moves the surface to `positions`, within one step.
     pub fn move_to(&mut self, positions: &[Point3<f32>]) {
         std::mem::swap(&mut self.before, &mut self.now);

@@ -63,6 +63,13 @@ impl Rest {
         Ok(Self { fabric, triangles, masses, elements, bends, anchors })
     }
 
+    /// Puts other anchors in place of those that there are.
+    pub fn tie(&mut self, anchors: Anchors) -> Result<(), ClothError> {
+        check_anchors(self.len(), &anchors)?;
+        self.anchors = if anchors.stiffness.is_empty() { vec![0.0; self.len()] } else { anchors.stiffness };
+        Ok(())
+    }
+
     /// Number of vertices.
     pub fn len(&self) -> usize {
         self.masses.len()
@@ -77,9 +84,14 @@ fn check(rest: &[Point3<f64>], triangles: &[[u32; 3]], anchors: &Anchors) -> Res
     if let Some(t) = triangles.iter().position(|t| t.iter().any(|&v| v as usize >= rest.len())) {
         return wrong(format!("triangle {t} names a vertex beyond the last of {}", rest.len()));
     }
+    check_anchors(rest.len(), anchors)
+}
+
+fn check_anchors(vertices: usize, anchors: &Anchors) -> Result<(), ClothError> {
+    let wrong = |reason: String| Err(ClothError::Sheet(reason));
     let count = anchors.stiffness.len();
-    if count != 0 && count != rest.len() {
-        return wrong(format!("{} vertices have {count} anchors", rest.len()));
+    if count != 0 && count != vertices {
+        return wrong(format!("{vertices} vertices have {count} anchors"));
     }
     match anchors.stiffness.iter().position(|k| !(k.is_finite() && *k >= 0.0)) {
         Some(v) => wrong(format!("the anchor of vertex {v} has a stiffness of {}", anchors.stiffness[v])),

@@ -46,6 +46,39 @@ impl Sheet {
         })
     }
 
+    /// What decides how the sheet moves on, to the bit: places, velocities, forces of contact, and where the anchors were.
+    pub fn state(&self) -> [Vec<f64>; 4] {
+        let flat = |values: &[Vector3<f64>]| values.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+        [flat(&self.positions), flat(&self.velocities), self.pressed.clone(), flat(&self.carried)]
+    }
+
+    /// Moves on from a `state` of the same sheet.
+    ///
+    /// # Errors
+    /// [`ClothError::Sheet`] where it is that of another.
+    pub fn restore(&mut self, state: [&[f64]; 4]) -> Result<(), ClothError> {
+        let n = self.len();
+        let [positions, velocities, pressed, carried] = state;
+        let fits = positions.len() == 3 * n && velocities.len() == 3 * n && pressed.len() == n;
+        if !fits || ![0, 3 * n].contains(&carried.len()) {
+            return Err(ClothError::Sheet(format!("a state of {} vertices is not one of its {n}", pressed.len())));
+        }
+        let vectors = |values: &[f64]| values.chunks_exact(3).map(|v| Vector3::new(v[0], v[1], v[2])).collect();
+        (self.positions, self.velocities, self.carried) = (vectors(positions), vectors(velocities), vectors(carried));
+        self.pressed = pressed.to_vec();
+        Ok(())
+    }
+
+    /// The same sheet at rest, its vertices tied to their anchors by springs of this `stiffness` (N/m, one a vertex).
+    ///
+    /// # Errors
+    /// [`ClothError::Sheet`] for anchors of another length, or one that is not a number of at least 0.
+    pub fn tied_by(&self, stiffness: Vec<f64>) -> Result<Self, ClothError> {
+        let mut tied = Self { system: None, ..self.clone() };
+        tied.rest.tie(Anchors { stiffness })?;
+        Ok(tied)
+    }
+
     /// Number of vertices.
     pub fn len(&self) -> usize {
         self.positions.len()

@@ -46,6 +46,12 @@ impl Outfit {
         &self.layers
     }
 
+    /// The weights w_p that [`Blend::Seed`](super::Blend::Seed) gives the physics of each garment: one, or two for a skirt (what lies on the
+    /// body, and what hangs free).
+    pub fn physical_shares(&self) -> Vec<Vec<f64>> {
+        self.proxies.iter().map(|proxy| proxy.shares.parts.clone()).collect()
+    }
+
     /// Positions of a layer in the outfit's first pose.
     pub fn scanned(&self, layer: usize) -> &[Point3<f32>] {
         &self.layers[layer].mesh.positions

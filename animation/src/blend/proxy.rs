@@ -7,8 +7,10 @@ use toile_geometry::{Mesh, bvh::Bvh, remesh};
 
 use super::{
     anchors::{Closeness, Over, frequency},
+    hung::Hung,
     layer::OutfitLayer,
     ride::Ride,
+    shares::Shares,
 };
 use crate::AnimationError;
 
@@ -29,6 +31,9 @@ pub(crate) struct Proxy {
     /// How tightly each vertex is tied to its skinned place: 1 on the skin, 0 where it hangs free.
     pub tied: Vec<f64>,
     pub ride: Ride,
+    /// The same sheet without ties, as the seed simulates it.
+    pub hung: Hung,
+    pub shares: Shares,
 }
 
 impl Proxy {
@@ -46,14 +51,16 @@ impl Proxy {
         let rest: Vec<Point3<f64>> = mesh.positions.iter().map(|p| p.cast()).collect();
         let shape = RestShape { positions: &rest, triangles: &mesh.triangles, curved: true, grain: Vector3::y() };
         let new = |anchors| Sheet::new(&shape, layer.fabric, anchors);
-        let masses = new(Anchors::default()).map_err(|e| wrong(e.to_string()))?.masses().to_vec();
-        let stiffness = masses.iter().zip(&frequencies).map(|(m, w)| m * w * w).collect();
-        let sheet = new(Anchors { stiffness }).map_err(|e| wrong(e.to_string()))?;
+        let loose = new(Anchors::default()).map_err(|e| wrong(e.to_string()))?;
+        let stiffness = loose.masses().iter().zip(&frequencies).map(|(m, w)| m * w * w).collect();
+        let sheet = loose.tied_by(stiffness).map_err(|e| wrong(e.to_string()))?;
+        let hung = Hung::new(&loose, &mesh, &weights)?;
         let tied = frequencies.iter().map(|w| (w / frequency(0.0, 0.0)).powi(2)).collect();
         let gaps = (0..over.len()).map(|v| distance(v).min(GAP)).collect();
         let skinner = Skinner::new(&mesh, &weights).map_err(|e| wrong(e.to_string()))?;
         let ride = Ride::new(&layer.mesh, &mesh);
-        Ok(Self { sheet, skinner, over, gaps, tied, ride })
+        let shares = Shares::new(&layer.mesh, closeness);
+        Ok(Self { sheet, skinner, over, gaps, tied, ride, hung, shares })
     }
 }
 

@@ -20,11 +20,13 @@ impl Ride {
         Self { places: fine.positions.par_iter().map(bind).collect() }
     }
 
-    /// Moves `fine` by the displacements of the proxy's vertices from their skinned places.
-    pub fn carry(&self, moved: &[Vector3<f32>], fine: &mut [Point3<f32>]) {
-        fine.par_iter_mut().zip(&self.places).for_each(|(p, (corners, weights))| {
+    /// Moves `fine` by the displacements of the proxy's vertices from their skinned places, each vertex by its share of `shares`; by all of
+    /// it where they are empty.
+    pub fn carry(&self, moved: &[Vector3<f32>], shares: &[f32], fine: &mut [Point3<f32>]) {
+        fine.par_iter_mut().zip(&self.places).enumerate().for_each(|(k, (p, (corners, weights)))| {
+            let share = shares.get(k).copied().unwrap_or(1.0);
             for (&v, w) in corners.iter().zip(weights) {
-                *p += moved[v as usize] * *w;
+                *p += moved[v as usize] * (*w * share);
             }
         });
     }

@@ -110,12 +110,17 @@ impl Columns {
         }
     }
 
+    /// Columns with all the room they want.
+    pub fn unpressed(&self, body: &[Point3<f32>]) -> Pressed {
+        let n = body.len();
+        let normals = vertex_normals(body, &self.triangles);
+        Pressed { floor: vec![0.0; n], step: vec![0.0; n], share: vec![1.0; n], normals }
+    }
+
     /// How the columns are pressed where the body stands at `body`.
     pub fn press(&self, body: &[Point3<f32>]) -> Pressed {
-        let normals = vertex_normals(body, &self.triangles);
-        let rooms = self.rooms(body, &normals);
-        let n = body.len();
-        let mut pressed = Pressed { floor: vec![0.0; n], step: vec![0.0; n], share: vec![1.0; n], normals };
+        let mut pressed = self.unpressed(body);
+        let rooms = self.rooms(body, &pressed.normals);
         for (v, &room) in rooms.iter().enumerate() {
             self.press_one(v, (room, self.scanned[v]), MARGIN, &mut pressed);
         }

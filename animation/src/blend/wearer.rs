@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use toile_character::{Pose, PosedSkin, Skinning};
-use toile_cloth::{Effort, MovingSurface, Obstacle, Sheet, Surroundings};
+use toile_cloth::{Effort, MovingSurface, Obstacle, Sheet, Surroundings, obstacle::Plane};
 
-use super::{Blend, outfit::Outfit, squeeze::Pressed};
+use super::{Blend, outfit::Outfit, proxy::Proxy, squeeze::Pressed};
 use crate::AnimationError;
 
 /// Farthest that a joint moves in one step of the simulation, metres, where that needs no more steps than are taken: the reach of contact
@@ -20,22 +20,31 @@ const DRY: f64 = 0.5;
 /// Time in which corrections fade, seconds: less than a step of a walk, so that no phase of it carries those of the others. Chosen by trying.
 const FORGET: f64 = 0.4;
 
+/// Acceleration of gravity, m/s².
+const GRAVITY: Vector3<f64> = Vector3::new(0.0, -9.81, 0.0);
+/// What catches a garment that falls off.
+const FLOOR: Plane = Plane { point: Vector3::new(0.0, 0.0, 0.0), normal: Vector3::new(0.0, 1.0, 0.0) };
+/// Work in a step for sheets that are tied to their skinned places, and for those that hang by contact alone: that has to be looked for
+/// more often, and the sheet falls onto itself.
+const TIED: Effort = Effort { rounds: 1, iterations: 10, tolerance: 5e-6, self_contact: false };
+const HUNG: Effort = Effort { rounds: 2, iterations: 10, tolerance: 5e-6, self_contact: true };
+
 /// An outfit in motion: give it pose after pose.
 pub struct Wearer<'a> {
     outfit: &'a Outfit,
-    blend: Blend,
+    pub(super) blend: Blend,
     way: Skinning,
-    pose: Pose,
-    sheets: Vec<Sheet>,
+    pub(super) pose: Pose,
+    pub(super) sheets: Vec<Sheet>,
     /// Skinned and pressed places of the proxies at the end of the last step.
-    carried: Vec<Vec<Vector3<f64>>>,
-    body: MovingSurface,
+    pub(super) carried: Vec<Vec<Vector3<f64>>>,
+    pub(super) body: MovingSurface,
     /// The garments' sheets as lower layers of each other.
     surfaces: Vec<MovingSurface>,
     /// How the columns are pressed in the last pose.
-    pressed: Option<Pressed>,
+    pub(super) pressed: Option<Pressed>,
     /// Where the vertices of each garment were moved to beside where cloth and skin take them, in their local frames.
-    corrections: Vec<Vec<Vector3<f32>>>,
+    pub(super) corrections: Vec<Vec<Vector3<f32>>>,
     skins: Vec<PosedSkin>,
     proxy_skins: Vec<PosedSkin>,
     layers: Vec<Vec<Point3<f32>>>,
@@ -45,7 +54,8 @@ impl<'a> Wearer<'a> {
     /// The outfit in its first pose, at rest.
     pub fn new(outfit: &'a Outfit, blend: Blend, way: Skinning) -> Self {
         let layers: Vec<Vec<Point3<f32>>> = outfit.layers.iter().map(|l| l.mesh.positions.clone()).collect();
-        let sheets: Vec<Sheet> = outfit.proxies.iter().map(|p| p.sheet.clone()).collect();
+        let sheet = |p: &Proxy| if blend.hangs() { p.hung.sheet.clone() } else { p.sheet.clone() };
+        let sheets: Vec<Sheet> = outfit.proxies.iter().map(sheet).collect();
         Self {
             blend,
             way,
@@ -73,7 +83,7 @@ impl<'a> Wearer<'a> {
     /// # Errors
     /// [`AnimationError::Motion`] where a layer cannot be moved.
     pub fn warm_up(&mut self, pose: &Pose, seconds: f64) -> Result<(), AnimationError> {
-        if self.blend == Blend::Anchored {
+        if self.blend != Blend::Skinning {
             let (steps, pressed) = (self.steps(pose), self.pressed_at(pose)?);
             let before = self.pressed.take();
             for k in 1..=steps {
@@ -101,24 +111,38 @@ impl<'a> Wearer<'a> {
         for (layer, skin) in self.layers.iter_mut().zip(&self.skins) {
             layer.clone_from(&skin.positions);
         }
-        if self.blend == Blend::Anchored {
-            self.finish(seconds);
+        match self.blend {
+            Blend::Skinning => {}
+            Blend::Anchored => self.finish(seconds),
+            Blend::Physics | Blend::Seed => self.mix(),
         }
         Ok(())
+    }
+
+    /// Takes of each garment's simulated motion the share that the blend gives it: Hu et al. 2017, eq. 8, with w_p = 1 for physics alone.
+    fn mix(&mut self) {
+        for (k, proxy) in self.outfit.proxies.iter().enumerate() {
+            let shares: &[f32] = if self.blend == Blend::Seed { &proxy.shares.of_vertices } else { &[] };
+            proxy.ride.carry(&self.moved_beside_skin(k), shares, &mut self.layers[k + 1]);
+        }
+    }
+
+    /// How far the vertices of garment `k`'s proxy are from where it is carried, metres.
+    fn moved_beside_skin(&self, k: usize) -> Vec<Vector3<f32>> {
+        self.sheets[k].positions.iter().zip(&self.carried[k]).map(|(x, c)| (x - c).cast::<f32>()).collect()
     }
 
     /// Presses the skinned layers and lets them ride on the cloth, from where they were corrected to last.
     fn finish(&mut self, seconds: f64) {
         let outfit = self.outfit;
         let skin = self.layers[0].clone();
-        let pressed = self.pressed.get_or_insert_with(|| outfit.columns.press(&skin));
+        let pressed = self.pressed.take().unwrap_or_else(|| outfit.columns.press(&skin));
         pressed.apply_to_body(&mut self.layers[0]);
         for (k, proxy) in outfit.proxies.iter().enumerate() {
+            let moved = self.moved_beside_skin(k);
             let fine = &mut self.layers[k + 1];
-            outfit.columns.apply(pressed, &skin, k, fine);
-            let moved: Vec<Vector3<f32>> =
-                self.sheets[k].positions.iter().zip(&self.carried[k]).map(|(x, c)| (x - c).cast::<f32>()).collect();
-            proxy.ride.carry(&moved, fine);
+            outfit.columns.apply(&pressed, &skin, k, fine);
+            proxy.ride.carry(&moved, &[], fine);
             let kept = (-seconds / FORGET).exp() as f32;
             let turns = &self.skins[k + 1].rotations;
             let corrections = &mut self.corrections[k];
@@ -127,6 +151,7 @@ impl<'a> Wearer<'a> {
                 *p += turn * *c;
             });
         }
+        self.pressed = Some(pressed);
     }
 
     /// Takes over where the layers were moved to after the last frame, to keep them apart: the next frame starts from there.
@@ -170,11 +195,12 @@ impl<'a> Wearer<'a> {
     }
 
     /// How the columns are pressed in a pose.
-    fn pressed_at(&mut self, pose: &Pose) -> Result<Pressed, AnimationError> {
+    pub(super) fn pressed_at(&mut self, pose: &Pose) -> Result<Pressed, AnimationError> {
         let moved = self.moved(pose);
         let posed = self.outfit.skinners[0].pose(&moved, self.way, &mut self.skins[0]);
         posed.map_err(|e| AnimationError::Motion(e.to_string()))?;
-        Ok(self.outfit.columns.press(&self.skins[0].positions))
+        let (columns, skin) = (&self.outfit.columns, &self.skins[0].positions);
+        Ok(if self.blend.hangs() { columns.unpressed(skin) } else { columns.press(skin) })
     }
 
     /// One step of the simulation, a `share` of the way from how the columns were pressed `before` to how they are pressed `after`.
@@ -207,7 +233,7 @@ impl<'a> Wearer<'a> {
             surface.move_to(&points(&sheet.positions));
             surface.move_to(&points(guess));
         });
-        let (body, surfaces, proxy_skins) = (&self.body, &self.surfaces, &self.proxy_skins);
+        let (body, surfaces, proxy_skins, hangs) = (&self.body, &self.surfaces, &self.proxy_skins, self.blend.hangs());
         let results: Vec<Result<(), toile_cloth::ClothError>> = self
             .sheets
             .par_iter_mut()
@@ -215,17 +241,16 @@ impl<'a> Wearer<'a> {
             .map(|(k, sheet)| {
                 let mut obstacles: Vec<&dyn Obstacle> = vec![body];
                 obstacles.extend(surfaces[..k].iter().map(|s| s as &dyn Obstacle));
-                let around = Surroundings {
-                    pulls: &pulls(&proxy_skins[k].rotations),
-                    anchors: &targets[k],
-                    guess: &guesses[k],
-                    obstacles: &obstacles,
-                    gaps: &outfit.proxies[k].gaps,
-                    drag: DRAG,
-                    dry: DRY,
-                    ..Surroundings::still()
-                };
-                sheet.advance(h, &around, &Effort { rounds: 1, iterations: 10, tolerance: 5e-6, self_contact: false })
+                let gaps = &outfit.proxies[k].gaps;
+                let met = Surroundings { anchors: &targets[k], guess: &guesses[k], gaps, ..Surroundings::still() };
+                if hangs {
+                    obstacles.push(&FLOOR);
+                    let around = Surroundings { gravity: GRAVITY, obstacles: &obstacles, ..met };
+                    return sheet.advance(h, &around, &HUNG);
+                }
+                let pulls = pulls(&proxy_skins[k].rotations);
+                let around = Surroundings { pulls: &pulls, obstacles: &obstacles, drag: DRAG, dry: DRY, ..met };
+                sheet.advance(h, &around, &TIED)
             })
             .collect();
         results.into_iter().collect::<Result<(), _>>().map_err(|e| wrong(&e))?;
@@ -235,7 +260,8 @@ impl<'a> Wearer<'a> {
 
     /// Where a sheet would be at the end of the step: cloth on the skin with the skin, cloth that hangs free as before.
     fn guess(&self, k: usize, sheet: &Sheet, target: &[Vector3<f64>], h: f64) -> Vec<Vector3<f64>> {
-        let tied = &self.outfit.proxies[k].tied;
+        let proxy = &self.outfit.proxies[k];
+        let tied = if self.blend.hangs() { &proxy.hung.tied } else { &proxy.tied };
         let place = |v: usize| {
             let carried = target[v] - self.carried[k][v];
             sheet.positions[v] + carried * tied[v] + sheet.velocities[v] * (h * (1.0 - tied[v]))
@@ -251,6 +277,5 @@ fn points(places: &[Vector3<f64>]) -> Vec<Point3<f32>> {
 /// Gravity, less what held the scanned shape against it: that turns with the body, so that cloth hangs as it was scanned
 /// while the body is as it was scanned, and falls to where it must when the body leans.
 fn pulls(rotations: &[UnitQuaternion<f32>]) -> Vec<Vector3<f64>> {
-    let gravity = Vector3::new(0.0, -9.81, 0.0);
-    rotations.iter().map(|r| gravity - r.cast::<f64>() * gravity).collect()
+    rotations.iter().map(|r| GRAVITY - r.cast::<f64>() * GRAVITY).collect()
 }

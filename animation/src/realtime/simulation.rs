@@ -29,6 +29,7 @@ const SHORTEST: f64 = 1e-6;
 
 /// The rough body and garments.
 pub(super) struct Simulation {
+    way: Skinning,
     posing: Posing,
     body: Body,
     pub garments: Vec<Rough>,
@@ -49,12 +50,13 @@ struct Body {
 }
 
 impl Simulation {
-    pub fn new(outfit: &Outfit) -> Result<Self, AnimationError> {
+    pub fn new(outfit: &Outfit, way: Skinning) -> Result<Self, AnimationError> {
         let body = &outfit.layers[0];
         let closeness = Closeness::new(&body.mesh);
         let garments: Result<Vec<Rough>, AnimationError> =
             outfit.layers[1..].par_iter().map(|layer| Rough::new(layer, &closeness)).collect();
         let mut simulation = Self {
+            way,
             posing: Posing::new(&outfit.skeleton, &outfit.pose0),
             body: Body::new(outfit)?,
             garments: garments?,
@@ -119,15 +121,15 @@ impl Simulation {
     /// Poses body and garments, and keeps where they were.
     fn skin(&mut self) -> Result<(), AnimationError> {
         let wrong = |e: toile_character::CharacterError| AnimationError::Motion(e.to_string());
-        let (moved, body) = (&self.posing.moved, &mut self.body);
+        let (way, moved, body) = (self.way, &self.posing.moved, &mut self.body);
         if !body.skin.positions.is_empty() {
             body.from.copy_from_slice(&body.skin.positions);
         }
-        body.skinner.pose(moved, Skinning::Linear, &mut body.skin).map_err(wrong)?;
+        body.skinner.pose(moved, way, &mut body.skin).map_err(wrong)?;
         body.bvh.refit(&body.skin.positions, &body.triangles);
         for garment in &mut self.garments {
             garment.from.copy_from_slice(&garment.to);
-            garment.skinner.pose(moved, Skinning::Linear, &mut garment.skin).map_err(wrong)?;
+            garment.skinner.pose(moved, way, &mut garment.skin).map_err(wrong)?;
             garment.to.copy_from_slice(&garment.skin.positions);
         }
         Ok(())

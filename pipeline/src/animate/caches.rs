@@ -2,13 +2,13 @@
 
 use std::{
     fs::{self, File},
-    io::{BufWriter, Read, Seek, SeekFrom},
+    io::{BufWriter, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
 
 use nalgebra::Point3;
 use toile_avatar::PointCache;
-use toile_capture::files::atomic_write;
+use toile_capture::files::{atomic_write, is_there};
 
 use super::report::AnimationReport;
 use crate::{PipelineError, json};
@@ -38,6 +38,50 @@ impl Caches {
         };
         let layers = layers.iter().map(begin).collect::<Result<_, _>>()?;
         Ok(Self { folder: folder.to_path_buf(), layers })
+    }
+
+    /// Goes on with the caches of an interrupted run of the same layers and frames, `done` of which are kept; `None` where they are not there
+    /// or shorter.
+    pub fn go_on(
+        folder: &Path,
+        layers: &[(&str, usize)],
+        frames: usize,
+        done: usize,
+    ) -> Result<Option<Self>, PipelineError> {
+        let mut opened = Vec::with_capacity(layers.len());
+        for &(name, points) in layers {
+            let (part, whole) = (folder.join(format!("{name}.pc2.part")), folder.join(format!("{name}.pc2")));
+            // Killed while whole caches were put in their place.
+            if done == frames && !is_there(&part) && is_there(&whole) {
+                fs::rename(&whole, &part).map_err(|e| PipelineError::io(&whole, e))?;
+            }
+            let length = (HEADER + done * points * 12) as u64;
+            match fs::symlink_metadata(&part) {
+                Ok(found) if found.is_file() && found.len() >= length => {}
+                _ => return Ok(None),
+            }
+            let wrap = |e| PipelineError::io(&part, e);
+            let mut file = File::options().read(true).write(true).open(&part).map_err(wrap)?;
+            let samples = u32::try_from(frames).unwrap_or(u32::MAX);
+            if !begins_as(&mut file, points, samples).map_err(wrap)? {
+                return Ok(None);
+            }
+            file.set_len(length).map_err(wrap)?;
+            file.seek(SeekFrom::End(0)).map_err(wrap)?;
+            let cache = PointCache::go_on(BufWriter::new(file), points, samples, done as u32).map_err(wrap)?;
+            opened.push((part, whole, cache));
+        }
+        Ok(Some(Self { folder: folder.to_path_buf(), layers: opened }))
+    }
+
+    /// Makes sure that all frames so far are on the disk.
+    pub fn sync(&mut self) -> Result<(), PipelineError> {
+        for (part, _, cache) in &mut self.layers {
+            let wrap = |e| PipelineError::io(part, e);
+            cache.out_mut().flush().map_err(wrap)?;
+            cache.out_mut().get_ref().sync_data().map_err(wrap)?;
+        }
+        Ok(())
     }
 
     /// Adds a frame of all layers.
@@ -109,6 +153,14 @@ impl Cached {
         let points = bytes.chunks_exact(12);
         Ok(points.map(|p| Point3::new(number(&p[..4]), number(&p[4..8]), number(&p[8..]))).collect())
     }
+}
+
+/// True where the file begins as a cache of so many points and samples does.
+fn begins_as(file: &mut File, points: usize, samples: u32) -> std::io::Result<bool> {
+    let expected = PointCache::begin(Vec::new(), points, samples)?.out_mut().clone();
+    let mut found = vec![0; expected.len()];
+    file.read_exact(&mut found)?;
+    Ok(found == expected)
 }
 
 fn remove(path: &Path) -> Result<(), PipelineError> {

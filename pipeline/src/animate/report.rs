@@ -2,12 +2,12 @@
 
 use nalgebra::Point3;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use toile_animation::blend::{Blend, Outfit};
 use toile_character::Motion;
 use toile_geometry::statistics::{Rank, quantile_by};
 
-use super::options::AnimateOptions;
+use super::{endless::Endless, options::AnimateOptions};
 use crate::garment::Garment;
 
 /// `report.json` of a motion.
@@ -21,8 +21,14 @@ pub struct AnimationReport {
     pub blend: Blend,
     /// How skin weights were blended.
     pub skinning: &'static str,
+    /// For the blend `seed`, the weight w_p of the physics in each garment: one, or two for a skirt (what lies on the body, what hangs).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub physical_shares: Option<Vec<Vec<f64>>>,
     /// Garments, inside to outside.
     pub garments: Vec<String>,
+    /// For a motion that goes round: what was played before it, and how well it closes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub endless: Option<Endless>,
     /// Milliseconds a frame: median, and nineteen of twenty are below.
     pub ms_a_frame: [f64; 2],
     /// Pairs of triangles of different layers that cross, mean over the frames.
@@ -32,7 +38,7 @@ pub struct AnimationReport {
 }
 
 /// One frame.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FrameReport {
     /// Milliseconds.
     pub ms: f64,
@@ -66,7 +72,9 @@ impl AnimationReport {
             fps: 1.0 / motion.frame_time,
             blend: options.blend,
             skinning: options.skinning.name(),
+            physical_shares: None,
             garments: garments.iter().map(|g| g.name.clone()).collect(),
+            endless: None,
             ms_a_frame: [0.0; 2],
             crossing_mean: 0.0,
             frames: Vec::with_capacity(motion.poses.len()),
@@ -90,7 +98,7 @@ impl AnimationReport {
     /// Sentences for the operator.
     pub(super) fn warnings(&self) -> Vec<String> {
         let crossing = self.frames.iter().filter(|f| f.crossing > 0).count();
-        if crossing == 0 || self.blend == Blend::Skinning {
+        if crossing == 0 || self.blend != Blend::Anchored {
             return Vec::new();
         }
         let (frames, mean) = (self.frames.len(), self.crossing_mean);

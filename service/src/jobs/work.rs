@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use toile_capture::Subject;
-use toile_character::{JointNaming, Skinning};
+use toile_character::JointNaming;
 use toile_garments::CullSettings;
 use toile_pipeline::{
     AnimateOptions, Blend, Goal, HiddenChoice, MotionChoice, Observer, Options, PipelineError, Remarks, animate,
@@ -35,8 +35,7 @@ pub fn work(kind: Kind, root: &Path, options: &JobOptions, observer: &dyn Observ
                     Some(BlendName::Skinning) => Blend::Skinning,
                     _ => Blend::Anchored,
                 },
-                skinning: Skinning::Linear,
-                settings: None,
+                ..AnimateOptions::default()
             };
             animate(root, &chosen, observer).map(|animated| animated.remarks)
         }

@@ -40,12 +40,15 @@ pub struct Animate {
     /// Frames a second, at most those of the motion
     #[arg(long, default_value_t = 30.0, value_parser = rate)]
     fps: f64,
-    /// By skin weights alone, or with cloth where it hangs
+    /// What moves the garments
     #[arg(long, value_enum, default_value_t = Way::Anchored)]
     blend: Way,
     /// How skin weights are blended
     #[arg(long, value_enum, default_value_t = Weights::Linear)]
     skinning: Weights,
+    /// Fabrics in SI units, and which garment is made of which (TOML; docs/fabrics.md); without: what its type is usually made of
+    #[arg(long, value_name = "FILE")]
+    fabrics: Option<PathBuf>,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
@@ -53,7 +56,13 @@ pub struct Animate {
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Way {
+    /// By skin weights alone
     Skinning,
+    /// Cloth held by nothing but contact, friction and waistbands
+    Physics,
+    /// Both mixed by one weight a garment, two for a skirt, as Hu et al. 2017 do (eq. 8 and 9)
+    Seed,
+    /// Cloth that is tied to the body the more closely it lies on it, and layers kept apart
     Anchored,
 }
 
@@ -83,6 +92,8 @@ impl Animate {
             fps: self.fps,
             blend: match self.blend {
                 Way::Skinning => Blend::Skinning,
+                Way::Physics => Blend::Physics,
+                Way::Seed => Blend::Seed,
                 Way::Anchored => Blend::Anchored,
             },
             skinning: match self.skinning {
@@ -90,7 +101,9 @@ impl Animate {
                 Weights::Log => Skinning::Log,
                 Weights::Hybrid => Skinning::Hybrid,
             },
+            fabrics: self.fabrics.clone(),
             settings: self.settings.clone(),
+            ..AnimateOptions::default()
         };
         let Animated { folder, report, remarks } = animate(&self.subject, &options, session.progress.as_ref())?;
         let text = format!(

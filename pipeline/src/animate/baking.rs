@@ -1,0 +1,139 @@
+//! The frames of a motion, one after the other into the caches; an earlier run that was killed is gone on with.
+
+use std::{path::Path, time::Instant};
+
+use toile_animation::blend::{Blend, Outfit, OutfitLayer};
+use toile_avatar::{Avatar, AvatarLayer};
+use toile_character::Motion;
+use toile_cloth::Fabric;
+
+use super::{
+    caches::{Caches, Written},
+    checkpoint::{self, Checkpoints, Key, Left},
+    endless::LeadIn,
+    mover::Mover,
+    options::AnimateOptions,
+    pictures::Pictures,
+    playable,
+    report::{AnimationReport, FrameReport},
+};
+use crate::{Observer, PipelineError, garment::Garment};
+
+/// A motion that is to be written.
+pub(super) struct Baking<'a> {
+    pub avatar: &'a Avatar,
+    pub garments: &'a [Garment],
+    /// What each layer is made of.
+    pub fabrics: &'a [Fabric],
+    pub motion: &'a Motion,
+    pub options: &'a AnimateOptions,
+    pub folder: &'a Path,
+    pub observer: &'a dyn Observer,
+}
+
+impl Baking<'_> {
+    /// Writes all files of the motion. Returns the report, and what the operator should know beside it.
+    ///
+    /// # Errors
+    /// [`PipelineError`] where a layer cannot be moved or a file not be written; what was begun is gone on with by the next run.
+    pub fn run(&self) -> Result<(AnimationReport, Vec<String>), PipelineError> {
+        let wrong = |e: &dyn std::fmt::Display| PipelineError::refused(self.folder, e.to_string());
+        let outfit = outfit(self.avatar, self.fabrics).map_err(|e| wrong(&e))?;
+        let mut mover = Mover::new(&outfit, self.options.blend, self.options.skinning);
+        let key = Key::new(self.avatar, self.fabrics, self.motion, self.options)?;
+        let mut checkpoints = Checkpoints::new(self.folder, key.clone(), self.options.checkpoint_every);
+        let (begun, said) = self.unfinished(&mut mover, &key)?;
+        let lead_in = LeadIn::of(self.motion, &self.avatar.skeleton);
+        let (mut caches, done) = match begun {
+            Some((caches, frames)) => (caches, frames),
+            None => {
+                checkpoints.clear()?;
+                mover.start(&self.avatar.pose0, self.motion, lead_in.as_ref()).map_err(|e| wrong(&e))?;
+                (Caches::begin(self.folder, &self.sizes(), self.motion.poses.len())?, Vec::new())
+            }
+        };
+        let mut report = AnimationReport::new(self.motion, self.options, self.garments);
+        report.physical_shares = (self.options.blend == Blend::Seed).then(|| outfit.physical_shares());
+        report.frames = done;
+        let (poses, count) = (&self.motion.poses, self.motion.poses.len());
+        for k in report.frames.len()..count {
+            let begun = Instant::now();
+            let moved = mover.frame(&poses[k.saturating_sub(1)], &poses[k], self.motion.frame_time);
+            moved.map_err(|e| wrong(&e))?;
+            let milliseconds = begun.elapsed().as_secs_f64() * 1e3;
+            mover.look();
+            caches.add(mover.layers())?;
+            report.frames.push(FrameReport::of(&outfit, mover.layers(), mover.crossing(), milliseconds));
+            checkpoints.at(&mut caches, &mover, &report.frames, k + 1 == count)?;
+            self.observer.at((k + 1) as f32 / count as f32);
+        }
+        self.finish(caches.written()?, &mut report, lead_in.as_ref())?;
+        checkpoints.clear()?;
+        Ok((report, said))
+    }
+
+    /// The caches and frames of an earlier run that was killed, its state taken over; and what is to be said of it.
+    #[allow(clippy::type_complexity)] // two answers, each said above
+    fn unfinished(
+        &self,
+        mover: &mut Mover,
+        key: &Key,
+    ) -> Result<(Option<(Caches, Vec<FrameReport>)>, Vec<String>), PipelineError> {
+        let (name, count) = (&self.motion.name, self.motion.poses.len());
+        let useless = |why: &str| {
+            Ok((
+                None,
+                vec![format!("motion {name}: what an unfinished run left is not used: {why}; all frames are made")],
+            ))
+        };
+        let (frames, state) = match checkpoint::left(self.folder, key)? {
+            Left::Nothing => return Ok((None, Vec::new())),
+            Left::Useless(why) => return useless(&why),
+            Left::Unfinished(frames, state) => (frames, state),
+        };
+        let caches = Caches::go_on(self.folder, &self.sizes(), count, frames.len())?;
+        let Some(caches) = caches.filter(|_| frames.len() <= count && mover.restore(&state).is_ok()) else {
+            return useless("its caches are not whole");
+        };
+        let said =
+            format!("motion {name}: an unfinished run is gone on with: {} of {count} frames were there", frames.len());
+        Ok((Some((caches, frames)), vec![said]))
+    }
+
+    /// Names and numbers of vertices of the layers.
+    fn sizes(&self) -> Vec<(&str, usize)> {
+        self.avatar.layers.iter().map(|l| (l.name.as_str(), l.mesh.positions.len())).collect()
+    }
+
+    /// Writes what is made from the caches, and puts all files in their place.
+    fn finish(
+        &self,
+        written: Written,
+        report: &mut AnimationReport,
+        lead_in: Option<&LeadIn>,
+    ) -> Result<(), PipelineError> {
+        report.sum_up();
+        let points: Vec<usize> = self.sizes().iter().map(|n| n.1).collect();
+        let mut cached = written.open(&points)?;
+        if let Some(lead_in) = lead_in {
+            report.endless = Some(lead_in.closed(&mut cached, self.motion)?);
+        }
+        let glb = playable::glb(self.avatar, self.motion, &mut cached, self.folder)?;
+        let (avatar, motion, folder) = (self.avatar, self.motion, self.folder);
+        let pictures = Pictures { avatar, motion, cached: &mut cached, folder }.files(report)?;
+        written.finish(&[("motion.glb", glb)].into_iter().chain(pictures).collect::<Vec<_>>(), report)
+    }
+}
+
+/// The avatar's layers, made of these `fabrics`.
+///
+/// # Errors
+/// [`toile_animation::AnimationError`] where a layer cannot be simulated.
+pub(super) fn outfit(avatar: &Avatar, fabrics: &[Fabric]) -> Result<Outfit, toile_animation::AnimationError> {
+    let of_layer = |(l, fabric): (&AvatarLayer, &Fabric)| {
+        let (name, mesh, weights) = (l.name.clone(), l.mesh.clone(), l.weights.clone());
+        OutfitLayer { name, mesh, weights, fabric: *fabric }
+    };
+    let layers = avatar.layers.iter().zip(fabrics).map(of_layer).collect();
+    Outfit::new(avatar.skeleton.clone(), avatar.pose0.clone(), layers)
+}

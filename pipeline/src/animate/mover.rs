@@ -1,0 +1,118 @@
+//! Layers carried from pose to pose, the way that was chosen.
+
+use nalgebra::Point3;
+use toile_animation::{
+    AnimationError,
+    blend::{Blend, Outfit, Wearer},
+};
+use toile_character::{Motion, Pose, Skinning};
+use toile_garments::Apart;
+
+use super::endless::LeadIn;
+
+/// Seconds over which the layers come from the pose of the scan into the motion's first, seconds in which they settle there, and
+/// seconds a step: a tenth of the way.
+const WARM_UP: (f64, f64, f64) = (1.0, 0.5, 0.1);
+
+/// Layers are kept apart on the way from frame to frame each time that a joint has moved this far against the hips, metres, and at most
+/// so often: a walk at 30 frames a second moves a hand by 60 mm.
+const LONG_WAY: f64 = 0.12;
+const MOST_PARTS: f64 = 8.0;
+/// Seconds before the first frame of an endless motion in which the layers are kept apart: twice what corrections last.
+const APART_BEFORE: f64 = 0.8;
+
+/// Layers that are carried from pose to pose.
+pub(super) struct Mover<'a> {
+    wearer: Wearer<'a>,
+    apart: Apart,
+    blend: Blend,
+    /// Pairs of triangles of different layers that cross now.
+    crossing: usize,
+}
+
+impl<'a> Mover<'a> {
+    /// The outfit in its first pose, at rest.
+    pub fn new(outfit: &'a Outfit, blend: Blend, skinning: Skinning) -> Self {
+        let meshes: Vec<_> = outfit.layers().iter().map(|l| &l.mesh).collect();
+        Self { wearer: Wearer::new(outfit, blend, skinning), apart: Apart::new(&meshes), blend, crossing: 0 }
+    }
+
+    /// Vertices of all layers, where the last frame left them.
+    pub fn layers(&self) -> &[Vec<Point3<f32>>] {
+        self.wearer.layers()
+    }
+
+    /// Pairs of triangles of different layers that cross there.
+    pub fn crossing(&self) -> usize {
+        self.crossing
+    }
+
+    /// Moves the layers on to a pose within `seconds`; layers are kept apart there, and on the way where that is long, unless they are to be
+    /// shown as they come.
+    pub fn frame(&mut self, from: &Pose, pose: &Pose, seconds: f64) -> Result<(), AnimationError> {
+        if self.blend == Blend::Skinning {
+            return self.wearer.advance(pose, seconds);
+        }
+        let parts = (self.wearer.way_to(pose) / LONG_WAY).ceil().clamp(1.0, MOST_PARTS) as usize;
+        for k in 1..=parts {
+            self.wearer.advance(&from.interpolated(pose, k as f64 / parts as f64), seconds / parts as f64)?;
+            if self.blend == Blend::Anchored {
+                let mut layers = self.wearer.layers().to_vec();
+                let is_apart = self.apart.keep(&mut layers) == 0;
+                self.crossing = if is_apart { 0 } else { self.apart.crossing() };
+                self.wearer.correct(&layers)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Counts what crosses where nothing keeps the layers apart.
+    pub fn look(&mut self) {
+        if self.blend != Blend::Anchored {
+            self.apart.look(self.wearer.layers());
+            self.crossing = self.apart.crossing();
+        }
+    }
+
+    /// What decides how the layers move on, to the bit.
+    pub fn state(&self) -> Vec<Vec<f64>> {
+        self.wearer.state()
+    }
+
+    /// Goes on from a state of the same layers.
+    pub fn restore(&mut self, state: &[Vec<f64>]) -> Result<(), AnimationError> {
+        self.wearer.restore(state)
+    }
+
+    /// Brings the layers from the pose of the scan to before the first frame of a `motion`: to its first pose, or through the
+    /// lead-in of one that goes round.
+    pub fn start(&mut self, scanned: &Pose, motion: &Motion, lead_in: Option<&LeadIn>) -> Result<(), AnimationError> {
+        let lead_in: &[Pose] = lead_in.map_or(&[], |lead_in| &lead_in.poses);
+        let first = lead_in.first().or(motion.poses.first());
+        let Some(first) = first.filter(|_| self.blend != Blend::Skinning) else { return Ok(()) };
+        self.warm_up(scanned, first)?;
+        // Corrections are forgotten sooner than swings: layers are kept apart only in the last of it.
+        let apart_from = lead_in.len().saturating_sub((APART_BEFORE / motion.frame_time).ceil() as usize);
+        for (k, pose) in lead_in.iter().enumerate().skip(1) {
+            if k < apart_from {
+                self.wearer.warm_up(pose, motion.frame_time)?;
+            } else {
+                self.frame(&lead_in[k - 1], pose, motion.frame_time)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Brings the layers from the pose of the scan into the `first` of a motion and lets them settle there.
+    fn warm_up(&mut self, scanned: &Pose, first: &Pose) -> Result<(), AnimationError> {
+        let steps = ((WARM_UP.0 + WARM_UP.1) / WARM_UP.2).ceil();
+        let mut before = scanned.clone();
+        for k in 1..=steps as usize {
+            let share = (k as f64 / (steps * WARM_UP.0 / (WARM_UP.0 + WARM_UP.1))).min(1.0);
+            let pose = scanned.interpolated(first, share);
+            self.frame(&before, &pose, WARM_UP.2)?;
+            before = pose;
+        }
+        Ok(())
+    }
+}
