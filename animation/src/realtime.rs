@@ -15,7 +15,10 @@
 //! one (`ThreadPool::install`) it takes none.
 
 mod class;
+mod hit;
 mod hits;
+mod link;
+mod on;
 mod order;
 mod particles;
 mod posing;

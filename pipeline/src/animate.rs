@@ -19,7 +19,10 @@ use toile_character::{BodyModel, Motion};
 use toile_garments::ExtractionReport;
 
 use self::{baking::Baking, fabrics::Fabrics};
-pub use self::{options::AnimateOptions, report::AnimationReport};
+pub use self::{
+    options::{AnimateOptions, Profile},
+    report::AnimationReport,
+};
 use crate::{
     Goal, Observer, Options, PipelineError, Record, Run,
     avatar_choice::AvatarChoice,

@@ -46,7 +46,8 @@ impl<'a> Closeness<'a> {
     pub fn foot(&self, p: &Point3<f32>) -> Option<(Point3<f32>, Vector3<f32>)> {
         let hit = self.bvh.closest(p, f32::INFINITY)?;
         let corners = self.body.triangles[hit.triangle as usize];
-        let normal: Vector3<f32> = corners.iter().zip(hit.barycentric).map(|(&v, w)| self.normals[v as usize] * w).sum();
+        let normal: Vector3<f32> =
+            corners.iter().zip(hit.barycentric).map(|(&v, w)| self.normals[v as usize] * w).sum();
         Some((hit.point, normal.try_normalize(1e-6)?))
     }
 

@@ -50,8 +50,18 @@ pub(super) fn floating(distance: f32, free: f32) -> f32 {
 pub(super) fn on_limb(weights: &SkinWeights, v: usize) -> bool {
     use Joint::*;
     let limbs = [
-        LeftUpperArm, LeftLowerArm, LeftHand, RightUpperArm, RightLowerArm, RightHand, LeftUpperLeg, LeftLowerLeg, LeftFoot,
-        RightUpperLeg, RightLowerLeg, RightFoot,
+        LeftUpperArm,
+        LeftLowerArm,
+        LeftHand,
+        RightUpperArm,
+        RightLowerArm,
+        RightHand,
+        LeftUpperLeg,
+        LeftLowerLeg,
+        LeftFoot,
+        RightUpperLeg,
+        RightLowerLeg,
+        RightFoot,
     ];
     JOINTS.get(usize::from(weights.joints[v][0])).is_some_and(|j| limbs.contains(j))
 }

@@ -7,8 +7,11 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use toile_geometry::{Mesh, bvh::Bvh};
 
+use super::{
+    hit::DEEPEST,
+    surface::{Foot, NONE, Surface},
+};
 use crate::blend::anchors::NEAR;
-use super::{hits::DEEPEST, surface::{Foot, NONE, Surface}};
 
 /// Least height over a lower layer, metres, where the scan had as much: three quarters of what layers have at rest.
 const GAP: f32 = 0.0012;
@@ -77,7 +80,11 @@ impl Over {
     /// Lifts each of the upper layer's `points` that is lower over the surface than it must be.
     fn lift(&mut self, points: &mut [Point3<f32>], surface: &Surface, places: &[Point3<f32>]) {
         let Self { seeds, homes, gaps } = self;
-        let chunks = points.par_chunks_mut(CHUNK).zip(seeds.par_chunks_mut(CHUNK)).zip(homes.par_chunks(CHUNK)).zip(gaps.par_chunks(CHUNK));
+        let chunks = points
+            .par_chunks_mut(CHUNK)
+            .zip(seeds.par_chunks_mut(CHUNK))
+            .zip(homes.par_chunks(CHUNK))
+            .zip(gaps.par_chunks(CHUNK));
         chunks.for_each(|(((points, seeds), homes), gaps)| {
             for (k, p) in points.iter_mut().enumerate() {
                 let Some(foot) = walk(surface, places, p, &mut seeds[k], homes[k]) else { continue };

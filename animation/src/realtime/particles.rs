@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::{
     class::Class,
-    hits::{Hit, HITS},
+    hit::{HITS, Hit},
     rough::Rough,
 };
 
@@ -15,25 +15,10 @@ pub(super) const STEP: f64 = 1.0 / 240.0;
 const DRAG: f32 = 7.0;
 /// Deceleration by the cloth's own friction, m/s²: cloth comes to rest within 0.1 / 5² m = 4 mm of where it hung in the scan.
 const DRY: f32 = 0.1;
-/// Share of what a link is too long or too short that a step takes away: along edges, across them.
-const ALONG: f32 = 0.9;
-const ACROSS: f32 = 0.15;
 /// Coefficient of friction of cloth on cloth and skin: that of shirting, in the table of fabrics.
 const FRICTION: f32 = 0.4;
 /// Fastest that cloth moves against the body, m/s: what a hand that is thrown reaches.
 const FASTEST: f32 = 12.0;
-
-/// A pair of vertices at a distance.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Link {
-    pub ends: [u32; 2],
-    /// 1 for an end that can be moved, 0 for one that is carried.
-    pub mobile: [f32; 2],
-    /// At rest, metres.
-    pub length: f32,
-    /// Along an edge, or across one.
-    pub along: bool,
-}
 
 impl Rough {
     /// Moves the rough mesh on by a step, from `share` to `share + part` of the way from `from` to `to`.
@@ -52,7 +37,9 @@ impl Rough {
                     let own = turn.inverse() * (self.places[v] - rest);
                     self.places[v] = rest + turn * self.half_spheres[v].hold(own);
                 }
-                Class::Trunk | Class::Floating => touch(&mut self.places[v], &self.before[v], &self.hits[v], share, part),
+                Class::Trunk | Class::Floating => {
+                    touch(&mut self.places[v], &self.before[v], &self.hits[v], share, part)
+                }
             }
         }
         for ((velocity, place), before) in self.velocities.iter_mut().zip(&self.places).zip(&self.before) {
@@ -86,23 +73,6 @@ impl Rough {
             let free = self.places[v] + (along + own) * h;
             self.places[v] = free + (carried - free) * (stiffness / (1.0 + stiffness));
         }
-    }
-}
-
-impl Link {
-    #[inline]
-    fn pull(&self, places: &mut [Point3<f32>]) {
-        let [a, b] = self.ends.map(|v| v as usize);
-        let way = places[b] - places[a];
-        let length = way.norm();
-        let sum = self.mobile[0] + self.mobile[1];
-        if length < 1e-9 {
-            return;
-        }
-        let share = if self.along { ALONG } else { ACROSS };
-        let by = way * (share * (1.0 - self.length / length) / sum);
-        places[a] += by * self.mobile[0];
-        places[b] -= by * self.mobile[1];
     }
 }
 

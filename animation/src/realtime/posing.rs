@@ -58,7 +58,10 @@ pub(super) fn between(from: &Pose, to: &Pose, share: f64, out: &mut Pose) {
 pub(super) fn check(pose: &Pose) -> Result<(), AnimationError> {
     let wrong = |reason: String| Err(AnimationError::Motion(reason));
     if pose.rotations.len() != JOINT_COUNT {
-        return wrong(format!("a pose has {} rotations; it needs one for each of {JOINT_COUNT} joints", pose.rotations.len()));
+        return wrong(format!(
+            "a pose has {} rotations; it needs one for each of {JOINT_COUNT} joints",
+            pose.rotations.len()
+        ));
     }
     let is_finite = |k: usize| pose.rotations[k].coords.iter().all(|c| c.is_finite());
     if let Some(joint) = JOINTS.into_iter().find(|j| !is_finite(j.index())) {

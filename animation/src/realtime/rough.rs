@@ -6,9 +6,9 @@ use toile_geometry::{bvh::Bvh, remesh, topology::Edges};
 
 use super::{
     class::{Class, HalfSphere, floating, on_limb},
-    hits::{Hit, HITS},
-    particles::Link,
-    together::On,
+    hit::{HITS, Hit},
+    link::Link,
+    on::On,
 };
 use crate::{
     AnimationError,
@@ -57,6 +57,7 @@ pub(super) struct Rough {
 }
 
 impl Rough {
+    /// Of a garment over the body of `closeness`.
     pub fn new(layer: &OutfitLayer, closeness: &Closeness) -> Result<Self, AnimationError> {
         let wrong = |reason: String| AnimationError::Motion(format!("layer {}: {reason}", layer.name));
         // An equilateral triangle of edge e has an area of 0.433 e², and there are two a vertex.

@@ -6,11 +6,11 @@ use toile_character::{Pose, PosedSkin, Skinner, Skinning};
 use toile_geometry::{bvh::Bvh, remesh};
 
 use super::{
-    hits::Below,
+    hit::Below,
     particles::STEP,
     posing::{self, Posing},
     rough::Rough,
-    together::On,
+    together::lies_on,
 };
 use crate::{
     AnimationError,
@@ -65,11 +65,10 @@ impl Simulation {
             left: 0.0,
         };
         for k in 0..simulation.garments.len() {
-            let heights =
-                (0..=k).map(|j| simulation.below(j).heights(&simulation.garments[k].places)).collect();
+            let heights = (0..=k).map(|j| simulation.below(j).heights(&simulation.garments[k].places)).collect();
             simulation.garments[k].heights = heights;
             let (below, rest) = simulation.garments.split_at(k);
-            let on = (0..rest[0].places.len()).map(|v| On::new(&rest[0], v, below)).collect();
+            let on = (0..rest[0].places.len()).map(|v| lies_on(&rest[0], v, below)).collect();
             simulation.garments[k].on = on;
         }
         simulation.skin()?;

@@ -86,12 +86,7 @@ fn within(weights: [f32; 3]) -> [f32; 3] {
 }
 
 #[inline]
-fn foot(
-    barycentric: [f32; 3],
-    normal: Vector3<f32>,
-    p: &Point3<f32>,
-    [a, b, c]: &[Point3<f32>; 3],
-) -> Foot {
+fn foot(barycentric: [f32; 3], normal: Vector3<f32>, p: &Point3<f32>, [a, b, c]: &[Point3<f32>; 3]) -> Foot {
     let place = a.coords * barycentric[0] + b.coords * barycentric[1] + c.coords * barycentric[2];
     Foot { normal, height: (p.coords - place).dot(&normal) }
 }
