@@ -82,7 +82,7 @@ impl Press {
     /// Minus the room over each vertex, into `less[0]`.
     fn rooms(&mut self, columns: &Columns, skin: &[Point3<f32>], normals: &[Vector3<f32>]) {
         let Self { bvh, faces, less: [less, other], .. } = self;
-        bvh.refit(skin, &columns.triangles);
+        bvh.refit_boxes(skin, &columns.triangles);
         let normal = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| skin[v as usize]);
             (b - a).cross(&(c - a)).try_normalize(1e-12).unwrap_or_default()

@@ -106,7 +106,7 @@ impl Simulation {
         self.skin()?;
         for garment in &mut self.garments {
             garment.places.iter_mut().zip(&garment.to).zip(&garment.moved).for_each(|((p, to), moved)| *p = to + moved);
-            garment.bvh.refit(&garment.places, &garment.triangles);
+            garment.bvh.refit_boxes(&garment.places, &garment.triangles);
         }
         self.keep(pose);
         Ok(())
@@ -125,7 +125,7 @@ impl Simulation {
             body.from.copy_from_slice(&body.skin.positions);
         }
         body.skinner.pose(moved, way, &mut body.skin).map_err(wrong)?;
-        body.bvh.refit(&body.skin.positions, &body.triangles);
+        body.bvh.refit_boxes(&body.skin.positions, &body.triangles);
         for garment in &mut self.garments {
             garment.from.copy_from_slice(&garment.to);
             garment.skinner.pose(moved, way, &mut garment.skin).map_err(wrong)?;
@@ -185,6 +185,6 @@ impl Rough {
         for v in 0..self.places.len() {
             self.moved[v] = self.places[v] - self.carried(v, share);
         }
-        self.bvh.refit(&self.places, &self.triangles);
+        self.bvh.refit_boxes(&self.places, &self.triangles);
     }
 }
