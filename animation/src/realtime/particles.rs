@@ -38,7 +38,7 @@ impl Rough {
                     self.places[v] = rest + turn * self.half_spheres[v].hold(own);
                 }
                 Class::Trunk | Class::Floating => {
-                    touch(&mut self.places[v], &self.before[v], &self.hits[v], share, part)
+                    touch(&mut self.places[v], &self.before[v], &self.hits[v], share, part);
                 }
             }
         }

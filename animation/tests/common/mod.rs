@@ -54,8 +54,8 @@ fn jumper(body: &Mesh, weights: &SkinWeights) -> (Mesh, SkinWeights) {
     let normals = body.vertex_normals();
     let out: Vec<Point3<f32>> = body.positions.iter().zip(&normals).map(|(p, n)| p + n * 0.012).collect();
     let covers = |v: u32| {
-        let joint = Joint::from_index(usize::from(weights.joints[v as usize][0])).unwrap();
         use Joint::*;
+        let joint = Joint::from_index(usize::from(weights.joints[v as usize][0])).unwrap();
         [Spine, Chest, UpperChest, LeftUpperArm, RightUpperArm, LeftLowerArm, RightLowerArm].contains(&joint)
     };
     let whole = Mesh::new(out, body.triangles.clone());
