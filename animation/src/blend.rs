@@ -14,16 +14,16 @@
 //! by themselves (`hung`), and take all of their motion, or the share of it that the seed's eq. 9 gives (`shares`). Whoever keeps the layers apart at full resolution afterwards tells the wearer
 //! where they came to lie ([`Wearer::correct`]): the next frame starts from there.
 
-mod anchors;
+pub(crate) mod anchors;
 mod hung;
-mod layer;
-mod loft;
-mod outfit;
-mod proxy;
-mod ride;
+pub(crate) mod layer;
+pub(crate) mod loft;
+pub(crate) mod outfit;
+pub(crate) mod proxy;
+pub(crate) mod ride;
 mod room;
 mod shares;
-mod squeeze;
+pub(crate) mod squeeze;
 mod state;
 mod strain;
 mod wearer;

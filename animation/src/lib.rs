@@ -4,6 +4,7 @@
 //! - [`retarget`]: any of the usual skeletons carried onto the target's 52 joints;
 //! - [`walk`]: a walk of our own making, also in `assets/walk.bvh` ([`shipped_walk`]);
 //! - [`blend`]: the layers of an outfit in motion, by skinning and by cloth;
+//! - [`realtime`]: the same frame by frame as a live object, fast enough for a screen;
 //! - [`decomposition`]: helper joints and weights by which skinning follows layers that move by themselves;
 //! - [`foot_figures`]: how well the feet of a motion stand, measured on the body's surface;
 //! - [`springs`]: chains of joints on which loose parts swing in other programs;
@@ -28,6 +29,7 @@ pub mod decomposition;
 mod error;
 mod foot_figures;
 mod footing;
+pub mod realtime;
 mod retarget;
 mod skeleton;
 pub mod springs;

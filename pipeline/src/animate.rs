@@ -23,7 +23,10 @@ use toile_character::{BodyModel, Motion};
 use toile_garments::ExtractionReport;
 
 use self::{fabrics::Fabrics, inputs::Baking};
-pub use self::{options::AnimateOptions, report::AnimationReport};
+pub use self::{
+    options::{AnimateOptions, Profile},
+    report::AnimationReport,
+};
 use crate::{
     Goal, Observer, Options, PipelineError, Record, Run,
     avatar_choice::AvatarChoice,

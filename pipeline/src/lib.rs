@@ -50,7 +50,7 @@ mod summary;
 mod take_order;
 mod ticket;
 
-pub use animate::{AnimateOptions, Animated, AnimationReport, animate};
+pub use animate::{AnimateOptions, Animated, AnimationReport, Profile, animate};
 pub use asked::Asked;
 pub use body_edits::BodyEdits;
 pub use body_file::Body;

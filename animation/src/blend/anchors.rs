@@ -13,9 +13,9 @@ const TIGHT: f64 = 150.0;
 const LOOSE: f64 = 5.0;
 /// Distance from the skin up to which cloth lies on it, metres: a looser garment than an undershirt. Chosen by trying: at 8 mm proxies
 /// of three subjects left the skin where the scan had lain on it.
-const NEAR: f64 = 0.015;
+pub(crate) const NEAR: f64 = 0.015;
 /// Distance from which cloth hangs free, metres: half the width of a trouser leg over a shin, assumed.
-const FAR: f64 = 0.06;
+pub(crate) const FAR: f64 = 0.06;
 
 /// Distances from the body in the outfit's first pose.
 pub(crate) struct Closeness<'a> {
@@ -40,6 +40,15 @@ impl<'a> Closeness<'a> {
     pub fn new(body: &'a Mesh) -> Self {
         let bvh = Bvh::new(&body.positions, &body.triangles);
         Self { body, normals: vertex_normals(&body.positions, &body.triangles), bvh }
+    }
+
+    /// The point of the body that is nearest to `p`, and the body's unit normal there.
+    pub fn foot(&self, p: &Point3<f32>) -> Option<(Point3<f32>, Vector3<f32>)> {
+        let hit = self.bvh.closest(p, f32::INFINITY)?;
+        let corners = self.body.triangles[hit.triangle as usize];
+        let normal: Vector3<f32> =
+            corners.iter().zip(hit.barycentric).map(|(&v, w)| self.normals[v as usize] * w).sum();
+        Some((hit.point, normal.try_normalize(1e-6)?))
     }
 
     /// The place of the body that is nearest to `p`, of which the share `free` hangs free by its kind.

@@ -16,13 +16,13 @@ use crate::AnimationError;
 
 /// A body and its garments, inside to outside, in the pose in which they were scanned.
 pub struct Outfit {
-    pub(super) skeleton: Skeleton,
-    pub(super) pose0: Pose,
-    pub(super) layers: Vec<OutfitLayer>,
-    pub(super) skinners: Vec<Skinner>,
+    pub(crate) skeleton: Skeleton,
+    pub(crate) pose0: Pose,
+    pub(crate) layers: Vec<OutfitLayer>,
+    pub(crate) skinners: Vec<Skinner>,
     /// One for each garment.
-    pub(super) proxies: Vec<Proxy>,
-    pub(super) columns: Columns,
+    pub(crate) proxies: Vec<Proxy>,
+    pub(crate) columns: Columns,
     /// One for each layer.
     pub(super) limits: Vec<StrainLimit>,
 }

@@ -65,7 +65,7 @@ impl Proxy {
 }
 
 /// Skin weights, and how far the cloth hangs free, from the nearest places of `fine`.
-fn carried_over(fine: &Mesh, weights: &SkinWeights, coarse: &Mesh) -> (SkinWeights, Vec<f64>) {
+pub(crate) fn carried_over(fine: &Mesh, weights: &SkinWeights, coarse: &Mesh) -> (SkinWeights, Vec<f64>) {
     let bvh = Bvh::new(&fine.positions, &fine.triangles);
     let of_part = fine.attributes.get(FREE_PART);
     let (mut out, mut free) = (SkinWeights::default(), Vec::with_capacity(coarse.positions.len()));

@@ -26,20 +26,20 @@ const OPPOSITE: f32 = 0.6;
 /// Room left between what belongs to either side, metres.
 const MARGIN: f32 = 0.0020;
 /// Rounds of smoothing over the body's vertices.
-const SMOOTHINGS: usize = 12;
+pub(crate) const SMOOTHINGS: usize = 12;
 /// Rings of vertices by which too little room spreads before that.
-const WIDENINGS: usize = 4;
+pub(crate) const WIDENINGS: usize = 4;
 
 /// The columns over the body.
 pub(crate) struct Columns {
-    triangles: Vec<[u32; 3]>,
-    neighbours: VertexNeighbors,
+    pub triangles: Vec<[u32; 3]>,
+    pub neighbours: VertexNeighbors,
     /// Over the body in the outfit's first pose.
-    bvh: Bvh,
+    pub bvh: Bvh,
     /// How deep below the skin a ray may start and still be inside this part of the body, metres.
     depths: Vec<f32>,
     /// How high the layers stand over each vertex in the outfit's first pose.
-    loft: Loft,
+    pub loft: Loft,
     /// True where no column stands: hands and feet, whose fingers and toes touch each other in any pose.
     bare: Vec<bool>,
     /// Room over each vertex in the outfit's first pose, metres.
@@ -49,11 +49,11 @@ pub(crate) struct Columns {
 /// How the columns are pressed in one pose.
 pub(crate) struct Pressed {
     /// Height of the skin, metres: 0 or below.
-    floor: Vec<f32>,
+    pub floor: Vec<f32>,
     /// Least height of a layer over the one below, metres; 0 where nothing is pressed.
-    step: Vec<f32>,
+    pub step: Vec<f32>,
     /// What is left of the height beside that, at most 1.
-    share: Vec<f32>,
+    pub share: Vec<f32>,
     pub normals: Vec<Vector3<f32>>,
 }
 
@@ -77,23 +77,25 @@ impl Columns {
         let mut bvh = self.bvh.clone();
         bvh.refit(body, &self.triangles);
         let faces: Vec<Vector3<f32>> = toile_geometry::mesh::triangle_normals(body, &self.triangles);
-        let room = |v: usize| {
-            let (n, depth) = (normals[v], self.depths[v]);
-            if self.bare[v] {
-                return TALLEST;
-            }
-            let origin = body[v] - n * depth;
-            let faces_us = |t: u32| faces[t as usize].dot(&n) < 0.0;
-            let hit = bvh.ray_where(&origin, &n, depth + 2.0 * self.loft.tops[v] + 2.0 * MARGIN, faces_us);
-            hit.map_or(TALLEST, |h| {
-                let opposite = ((-faces[h.triangle as usize].dot(&n) - BESIDE) / (OPPOSITE - BESIDE)).clamp(0.0, 1.0);
-                (h.t - depth) / 2.0 + (1.0 - opposite) * TALLEST
-            })
-        };
+        let room = |v: usize| self.room(v, &bvh, &faces, (&body[v], &normals[v]));
         let less: Vec<f32> = (0..body.len()).into_par_iter().map(|v| -room(v)).collect();
         // Wider than the smoothing reaches, so that it adds nothing where two parts meet.
         let less = (0..WIDENINGS).fold(less, |less, _| widened(&less, &self.neighbours));
         smoothed(&less, &self.neighbours, SMOOTHINGS).iter().map(|r| -r).collect()
+    }
+
+    /// Room over vertex `v` of a body with this hierarchy and these `faces`' normals, where the vertex is at a place with a normal.
+    pub fn room(&self, v: usize, bvh: &Bvh, faces: &[Vector3<f32>], (p, n): (&Point3<f32>, &Vector3<f32>)) -> f32 {
+        let depth = self.depths[v];
+        if self.bare[v] {
+            return TALLEST;
+        }
+        let faces_us = |t: u32| faces[t as usize].dot(n) < 0.0;
+        let hit = bvh.ray_where(&(p - n * depth), n, depth + 2.0 * self.loft.tops[v] + 2.0 * MARGIN, faces_us);
+        hit.map_or(TALLEST, |h| {
+            let opposite = ((-faces[h.triangle as usize].dot(n) - BESIDE) / (OPPOSITE - BESIDE)).clamp(0.0, 1.0);
+            (h.t - depth) / 2.0 + (1.0 - opposite) * TALLEST
+        })
     }
 
     /// Between how they were pressed `before`, if they were, and `after`, of which it has the `share`, where the body stands at `body`.
@@ -120,21 +122,27 @@ impl Columns {
         let mut pressed = self.unpressed(body);
         let rooms = self.rooms(body, &pressed.normals);
         for (v, &room) in rooms.iter().enumerate() {
-            // What had no more room in the outfit's first pose was scanned so.
-            let (scanned, count) = (self.scanned[v], self.loft.count(v));
-            let top = self.loft.tops[v].min(scanned);
-            if room >= top.min(scanned - MARGIN) || self.bare[v] {
-                continue;
-            }
-            // Slowly at first, so that layers with room are not moved.
-            let step = THINNEST * ((top - room).max(0.0) / (THINNEST * count.max(1.0))).min(1.0);
-            let lowest = |room: f32| (room - MARGIN - step * count).min(0.0);
-            pressed.step[v] = step;
-            pressed.floor[v] = (lowest(room) - lowest(scanned)).min(0.0);
-            let left = room - MARGIN - pressed.floor[v] - step * count;
-            pressed.share[v] = if top > 1e-6 { (left / top).clamp(0.0, 1.0) } else { 0.0 };
+            self.press_one(v, (room, self.scanned[v]), MARGIN, &mut pressed);
         }
         pressed
+    }
+
+    /// Presses the column over vertex `v`, which has this room now and had it in the outfit's first pose, with a `margin` between what
+    /// belongs to either side; all in metres.
+    pub fn press_one(&self, v: usize, (room, scanned): (f32, f32), margin: f32, pressed: &mut Pressed) {
+        // What had no more room in the outfit's first pose was scanned so.
+        let count = self.loft.count(v);
+        let top = self.loft.tops[v].min(scanned);
+        if room >= top.min(scanned - margin) || self.bare[v] {
+            return;
+        }
+        // Slowly at first, so that layers with room are not moved.
+        let step = THINNEST * ((top - room).max(0.0) / (THINNEST * count.max(1.0))).min(1.0);
+        let lowest = |room: f32| (room - margin - step * count).min(0.0);
+        pressed.step[v] = step;
+        pressed.floor[v] = (lowest(room) - lowest(scanned)).min(0.0);
+        let left = room - margin - pressed.floor[v] - step * count;
+        pressed.share[v] = if top > 1e-6 { (left / top).clamp(0.0, 1.0) } else { 0.0 };
     }
 
     /// Presses vertices of garment `k` that stand `over` places of the skin.

@@ -37,17 +37,27 @@ impl Bvh {
     /// Takes over moved `positions` of the mesh it was built from, with the same `triangles`. It keeps the division, which
     /// costs a fraction of building anew. Queries stay exact; they get slower where neighbours in space change. O(n).
     pub fn refit(&mut self, positions: &[Point3<f32>], triangles: &[[u32; 3]]) {
+        self.refit_boxes(positions, triangles);
+        summarise(&self.tree.nodes, &self.corners, &mut self.far_fields);
+    }
+
+    /// As [`Bvh::refit`], for all queries but winding numbers, which stay those of before; it takes no memory.
+    pub fn refit_boxes(&mut self, positions: &[Point3<f32>], triangles: &[[u32; 3]]) {
         for (corners, &t) in self.corners.iter_mut().zip(&self.tree.order) {
             *corners = triangles[t as usize].map(|v| positions[v as usize]);
         }
-        self.summarise();
+        self.boxes();
     }
 
-    fn summarise(&mut self) {
+    fn boxes(&mut self) {
         self.tree.refit(|i| {
             let [a, b, c] = &self.corners[i];
             (a.inf(b).inf(c), a.sup(b).sup(c))
         });
+    }
+
+    fn summarise(&mut self) {
+        self.boxes();
         summarise(&self.tree.nodes, &self.corners, &mut self.far_fields);
     }
 }

@@ -29,7 +29,7 @@ impl Baking<'_> {
     pub fn run(&self) -> Result<(AnimationReport, Vec<String>), PipelineError> {
         let wrong = |e: &dyn std::fmt::Display| PipelineError::refused(self.folder, e.to_string());
         let outfit = outfit(self.avatar, self.fabrics).map_err(|e| wrong(&e))?;
-        let mut mover = Mover::new(&outfit, self.options.blend, self.options.skinning);
+        let mut mover = Mover::new(&outfit, self.options).map_err(|e| wrong(&e))?;
         let key = Key::new(self.avatar, self.fabrics, self.motion, self.options)?;
         let mut checkpoints = Checkpoints::new(self.folder, key.clone(), self.options.checkpoint_every);
         let (begun, mut said) = self.unfinished(&mut mover, &key)?;

@@ -46,7 +46,7 @@ impl Key {
         motion: &Motion,
         options: &AnimateOptions,
     ) -> Result<Self, PipelineError> {
-        let how = serde_json::json!([options.blend, options.skinning.name(), fabrics]);
+        let how = serde_json::json!([options.profile, options.blend, options.skinning.name(), fabrics]);
         Ok(Self {
             program: PROGRAM.into(),
             version: VERSION,
@@ -62,7 +62,7 @@ impl Key {
             (self.program != other.program || self.version != other.version, "program"),
             (self.subject != other.subject, "state of the subject"),
             (self.motion != other.motion, "motion"),
-            (self.settings != other.settings, "blend, skinning or fabric"),
+            (self.settings != other.settings, "profile, blend, skinning or fabric"),
         ];
         parts.into_iter().find(|(differs, _)| *differs).map(|(_, what)| what)
     }

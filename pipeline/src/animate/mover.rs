@@ -4,11 +4,15 @@ use nalgebra::Point3;
 use toile_animation::{
     AnimationError,
     blend::{Blend, Outfit, Wearer},
+    realtime::Live,
 };
-use toile_character::{Motion, Pose, Skinning};
+use toile_character::{Motion, Pose};
 use toile_garments::Apart;
 
-use super::endless::LeadIn;
+use super::{
+    endless::LeadIn,
+    options::{AnimateOptions, Profile},
+};
 
 /// Seconds over which the layers come from the pose of the scan into the motion's first, seconds in which they settle there, and
 /// seconds a step: a tenth of the way.
@@ -29,6 +33,8 @@ const APART_BEFORE: f64 = 0.8;
 /// Layers that are carried from pose to pose.
 pub(super) struct Mover<'a> {
     wearer: Wearer<'a>,
+    /// Moves the layers instead of the wearer in real time.
+    live: Option<Live<'a>>,
     apart: Apart,
     blend: Blend,
     /// Pairs of triangles of different layers that cross now.
@@ -38,20 +44,20 @@ pub(super) struct Mover<'a> {
 
 impl<'a> Mover<'a> {
     /// The outfit in its first pose, at rest.
-    pub fn new(outfit: &'a Outfit, blend: Blend, skinning: Skinning) -> Self {
+    pub fn new(outfit: &'a Outfit, options: &AnimateOptions) -> Result<Self, AnimationError> {
+        let AnimateOptions { profile, blend, skinning, .. } = *options;
         let meshes: Vec<_> = outfit.layers().iter().map(|l| &l.mesh).collect();
-        Self {
-            wearer: Wearer::new(outfit, blend, skinning),
-            apart: Apart::new(&meshes),
-            blend,
-            crossing: 0,
-            jumped: false,
-        }
+        let live = match profile {
+            Profile::Bake => None,
+            Profile::Realtime => Some(Live::new(outfit, skinning)?),
+        };
+        let wearer = Wearer::new(outfit, blend, skinning);
+        Ok(Self { wearer, live, apart: Apart::new(&meshes), blend, crossing: 0, jumped: false })
     }
 
     /// Vertices of all layers, where the last frame left them.
     pub fn layers(&self) -> &[Vec<Point3<f32>>] {
-        self.wearer.layers()
+        self.live.as_ref().map_or_else(|| self.wearer.layers(), |live| live.layers())
     }
 
     /// Pairs of triangles of different layers that cross there.
@@ -62,6 +68,9 @@ impl<'a> Mover<'a> {
     /// Moves the layers on to a pose within `seconds`; layers are kept apart there, and on the way where that is long, unless they are to be
     /// shown as they come.
     pub fn frame(&mut self, from: &Pose, pose: &Pose, seconds: f64) -> Result<(), AnimationError> {
+        if let Some(live) = &mut self.live {
+            return live.advance(seconds, pose);
+        }
         if self.blend == Blend::Skinning {
             return self.wearer.advance(pose, seconds);
         }
@@ -92,8 +101,9 @@ impl<'a> Mover<'a> {
 
     /// Counts what crosses where nothing keeps the layers apart.
     pub fn look(&mut self) {
-        if self.blend != Blend::Anchored {
-            self.apart.look(self.wearer.layers());
+        if self.blend != Blend::Anchored || self.live.is_some() {
+            let layers = self.live.as_ref().map_or_else(|| self.wearer.layers(), |live| live.layers());
+            self.apart.look(layers);
             self.crossing = self.apart.crossing();
         }
     }
@@ -104,7 +114,13 @@ impl<'a> Mover<'a> {
     }
 
     /// Goes on from a state of the same layers.
+    ///
+    /// # Errors
+    /// [`AnimationError::Motion`] for a state of other layers, and in real time, where frames are made sooner than they are kept.
     pub fn restore(&mut self, state: &[Vec<f64>]) -> Result<(), AnimationError> {
+        if self.live.is_some() {
+            return Err(AnimationError::Motion("a motion in real time is not gone on with".into()));
+        }
         self.wearer.restore(state)
     }
 
@@ -113,12 +129,12 @@ impl<'a> Mover<'a> {
     pub fn start(&mut self, scanned: &Pose, motion: &Motion, lead_in: Option<&LeadIn>) -> Result<(), AnimationError> {
         let lead_in: &[Pose] = lead_in.map_or(&[], |lead_in| &lead_in.poses);
         let first = lead_in.first().or(motion.poses.first());
-        let Some(first) = first.filter(|_| self.blend != Blend::Skinning) else { return Ok(()) };
+        let Some(first) = first.filter(|_| self.live.is_some() || self.blend != Blend::Skinning) else { return Ok(()) };
         self.warm_up(scanned, first)?;
         // Corrections are forgotten sooner than swings: layers are kept apart only in the last of it.
         let apart_from = lead_in.len().saturating_sub((APART_BEFORE / motion.frame_time).ceil() as usize);
         for (k, pose) in lead_in.iter().enumerate().skip(1) {
-            if k < apart_from {
+            if k < apart_from && self.live.is_none() {
                 self.wearer.warm_up(pose, motion.frame_time)?;
             } else {
                 self.frame(&lead_in[k - 1], pose, motion.frame_time)?;

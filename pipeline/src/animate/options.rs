@@ -2,10 +2,22 @@
 
 use std::{path::PathBuf, time::Duration};
 
+use serde::Serialize;
 use toile_animation::blend::Blend;
 use toile_character::Skinning;
 
 use crate::options::MotionChoice;
+
+/// How much time a frame may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Profile {
+    /// As much as it needs: cloth as it moves, layers moved apart at full resolution.
+    #[default]
+    Bake,
+    /// No more than a screen leaves: three classes of cloth, layers kept in their order.
+    Realtime,
+}
 
 /// How layers are to move.
 #[derive(Debug, Clone)]
@@ -14,7 +26,9 @@ pub struct AnimateOptions {
     pub motion: MotionChoice,
     /// Frames a second.
     pub fps: f64,
-    /// How the layers follow the skeleton.
+    /// How much time a frame may take.
+    pub profile: Profile,
+    /// How the layers follow the skeleton in the profile `bake`.
     pub blend: Blend,
     /// How skin weights are blended.
     pub skinning: Skinning,
@@ -33,6 +47,7 @@ impl Default for AnimateOptions {
         Self {
             motion: MotionChoice::AsBefore,
             fps: 30.0,
+            profile: Profile::default(),
             blend: Blend::default(),
             skinning: Skinning::Linear,
             compare: false,

@@ -7,7 +7,7 @@ use toile_animation::blend::{Blend, Outfit};
 use toile_character::Motion;
 use toile_geometry::statistics::{Rank, quantile_by};
 
-use super::options::AnimateOptions;
+use super::options::{AnimateOptions, Profile};
 use crate::garment::Garment;
 
 /// `report.json` of a motion.
@@ -17,7 +17,9 @@ pub struct AnimationReport {
     pub motion: String,
     /// Frames a second.
     pub fps: f64,
-    /// How the layers followed the skeleton.
+    /// How much time a frame might take.
+    pub profile: Profile,
+    /// How the layers followed the skeleton in the profile `bake`.
     pub blend: Blend,
     /// How skin weights were blended.
     pub skinning: &'static str,
@@ -96,6 +98,7 @@ impl AnimationReport {
         Self {
             motion: motion.name.clone(),
             fps: 1.0 / motion.frame_time,
+            profile: options.profile,
             blend: options.blend,
             skinning: options.skinning.name(),
             physical_shares: None,
