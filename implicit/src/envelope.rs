@@ -47,8 +47,8 @@ impl Envelope {
     /// # Errors
     /// [`ImplicitError`] where the template lacks what the plan starts from, or joints do not stand as a person's do.
     pub fn new(model: &BodyModel, body: &ImplicitBody, level: Level) -> Result<Self, ImplicitError> {
-        let extremities = Extremities::new(model, &body.beta, &body.skeleton)?;
-        let plan = Plan::new(model, &body.beta, &body.skeleton, &extremities, level)?;
+        let extremities = Extremities::new(model, body)?;
+        let plan = Plan::new(model, body, &extremities, level)?;
         let patches = Patches::new(plan.count, &plan.quads);
         let mut envelope = Self { plan, extremities, triangles: Vec::new(), through: Through::default(), patches };
         envelope.join(body);

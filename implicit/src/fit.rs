@@ -73,7 +73,7 @@ pub fn fit(
     settings: &FitSettings,
 ) -> Result<Fitted, ImplicitError> {
     let (name, skeleton, beta) = (name.to_string(), body.skeleton.clone(), beta.to_vec());
-    let mut fitted = ImplicitBody { name, field: settings.field, skeleton, beta, primitives: Vec::new() };
+    let mut fitted = ImplicitBody { name, field: settings.field, skeleton, beta, scale: 1.0, primitives: Vec::new() };
     let envelope = Envelope::new(model, &fitted, LEVELS[0])?;
     let samples = Samples::new(&envelope, &fitted, body, poses);
     fitted.primitives = start::primitives(&fitted, &samples);

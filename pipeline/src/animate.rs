@@ -20,20 +20,20 @@ use toile_avatar::Avatar;
 use toile_capture::printable;
 use toile_character::{BodyModel, Motion, Pose};
 use toile_cloth::Fabric;
-use toile_garments::{Apart, ExtractionReport, GarmentType};
+use toile_garments::{Apart, GarmentType};
 
 use self::{caches::Caches, pictures::Pictures, report::FrameReport};
 pub use self::{options::AnimateOptions, report::AnimationReport};
 use crate::{
-    Goal, Observer, Options, PipelineError, Record, Run,
+    Goal, Observer, Options, PipelineError, Run,
     avatar_choice::AvatarChoice,
     body_file::Body,
-    garment::Garment,
+    garment::{self, Garment},
     options::MotionChoice,
     process::process,
-    record, settings,
-    step::{Remarks, Step},
-    steps::{cut::Cut, export},
+    settings,
+    step::Remarks,
+    steps::export,
 };
 
 /// Expected seconds a frame of a garment.
@@ -74,7 +74,7 @@ pub fn animate(root: &Path, options: &AnimateOptions, observer: &dyn Observer) -
     let model = BodyModel::load_default()?;
     let body = Body::load(&run.folders, run.first_layer(), &model)?;
     let choice = AvatarChoice::read(&run.folders)?;
-    let garments = garments(&run)?;
+    let garments = garment::stacked(&run)?;
     let export = export::Export { run: &run, body: &body, garments: &garments, choice: &choice };
     let path = match &options.motion {
         MotionChoice::AsBefore => choice.motion_path(&run.folders),
@@ -110,19 +110,6 @@ fn folder(run: &Run, motion: &Motion) -> Result<PathBuf, PipelineError> {
             Err(PipelineError::refused(&all, reason))
         }
     }
-}
-
-/// The garments that the last run stacked.
-fn garments(run: &Run) -> Result<Vec<Garment>, PipelineError> {
-    let mut out = Vec::new();
-    for number in run.first_garment()..run.layers.len() {
-        let folder = run.folders.layer(&run.layers[number]);
-        let cut: Option<Record<ExtractionReport>> = record::read(&folder, Cut::NAME)?;
-        if let Some(cut) = cut.filter(|_| run.folders.garment(&run.layers[number]).is_file()) {
-            out.push(Garment::new(run, number, &cut.result)?);
-        }
-    }
-    Ok(out)
 }
 
 /// The cloth that a garment of a type is made of, as far as its type says.

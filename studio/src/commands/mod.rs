@@ -28,5 +28,6 @@ pub mod reorder;
 pub mod sculpt;
 pub mod serve;
 pub mod settings;
+pub mod shape;
 pub mod synthesize;
 pub mod texture_size;
