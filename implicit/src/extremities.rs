@@ -1,7 +1,7 @@
 //! Head, hands and feet: rigid but for their joints, taken from the template body (paper 002 §3 and §4.1).
 
 use nalgebra::Point3;
-use toile_character::{BodyModel, Joint, Pose, Region, Skeleton, SkinnedMesh, skinning};
+use toile_character::{BodyModel, Joint, Pose, Region, SkinnedMesh, skinning};
 use toile_geometry::{Mesh, topology::boundary_loops};
 
 use crate::{ImplicitError, body::ImplicitBody};
