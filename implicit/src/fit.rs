@@ -15,7 +15,10 @@ mod stray;
 use toile_character::{BodyModel, Pose, SkinnedMesh};
 
 use self::{samples::Samples, solve::Problem};
-use crate::{ImplicitError, body::ImplicitBody, envelope::Envelope, field_function::FieldFunction, level::LEVELS};
+use crate::{
+    ImplicitError, body::ImplicitBody, envelope::Envelope, field_function::FieldFunction, level::LEVELS,
+    muscles::name_muscles,
+};
 
 /// How primitives are fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +95,7 @@ pub fn fit(
         fitted.primitives.extend(add::primitives(&fitted, &samples, &errors, batch));
         iterations = NEXT_ITERATIONS;
     }
+    name_muscles(&mut fitted);
     Ok(Fitted { body: fitted, steps })
 }
 

@@ -20,7 +20,7 @@
 //! kind = "metaball"            # or "ellipsoid", which does not blend
 //! groups = ["left_upper_arm"]  # that of its joint where they are left out; ["root"] blends with all
 //!
-//! [primitive.muscle]
+//! [primitive.muscle]           # center and turn of min and max are those at rest where they are left out
 //! reference = "leftLowerArm"
 //! axis = [0.0, 1.0, 0.0]
 //! limits = [-10.0, 0.0, 145.0] # lowest angle, relaxed, highest; degrees

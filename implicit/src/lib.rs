@@ -37,6 +37,7 @@ pub mod fit;
 pub mod format;
 mod group;
 mod level;
+mod muscles;
 pub mod plan;
 mod primitive;
 mod real_time;

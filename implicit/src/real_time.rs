@@ -1,7 +1,7 @@
 //! Bodies in real time: contours deformed directly (paper 002 §4).
 //!
 //! Contours are sampled once, in an initial pose. In every other pose rays are configured as before, by joint angles and by rims, but
-//! each point lies as far along its ray as it did then; no field is evaluated and no patch is built. Points of contours are the vertices,
+//! each point lies as far along its ray, or beyond the point that the ray passes, as it did then; no field is evaluated and no patch is built. Points of contours are the vertices,
 //! triangles are an array of indices that never changes. Head, hands and feet are rigid.
 
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -27,9 +27,9 @@ use crate::{
 pub struct RealTime {
     plan: Plan,
     body: ImplicitBody,
-    /// For each node, how far along its ray the point lies: metres on a ring, elsewhere in lengths of the way to the point that
-    /// the ray passes.
-    along: Vec<f64>,
+    /// For each node, how far the point lies from the ray's origin on a ring, elsewhere beyond the point that the ray passes; and how long
+    /// the ray was up to there; metres.
+    beyond: Vec<[f64; 2]>,
     /// Cosine and sine of the angle of a ring's point.
     turns: Vec<[f64; 2]>,
     /// Points of head, hands and feet at rest, each with its extremity.
@@ -73,7 +73,7 @@ impl RealTime {
         };
         let rims = envelope.plan.nodes.iter().map(|n| on_rim(&n.rule)).collect();
         let (plan, body) = (envelope.plan, body.clone());
-        let mut out = Self { along: vec![1.0; plan.nodes.len()], plan, body, turns, rigid, rims, triangles };
+        let mut out = Self { beyond: vec![[0.0, 1.0]; plan.nodes.len()], plan, body, turns, rigid, rims, triangles };
         out.learn(initial, &contours.points);
         Ok(out)
     }
@@ -91,7 +91,11 @@ impl RealTime {
     /// Moves the vertices of `out` into `pose`. O(vertices); nothing is allocated from the second frame on, but for a few hundred
     /// planes.
     pub fn deform(&self, pose: &Pose, out: &mut Deformed) {
-        let frames = self.configure(pose, out, |n, origin, way| origin + way * self.along[n]);
+        let frames = self.configure(pose, out, |n, passed, direction, length| {
+            let [beyond, at_first] = self.beyond[n];
+            // where a ray has nearly no length left, as in a closed armpit, its direction says nothing any more
+            passed + direction * (beyond * (length / at_first).min(1.0))
+        });
         out.positions.clear();
         out.positions.extend(out.nodes[..self.plan.count].iter().map(|p| p.cast::<f32>()));
         let rigid: [Isometry3<f32>; 5] = frames.map(|f| f.cast());
@@ -105,25 +109,24 @@ impl RealTime {
         Mesh::new(out.positions, self.triangles.clone())
     }
 
-    /// Reads off how far along its ray each of the sampled `points` lies.
+    /// Reads off how far beyond what its ray passes each of the sampled `points` lies.
     fn learn(&mut self, initial: &Pose, points: &[Point3<f64>]) {
-        let mut along = vec![1.0; points.len()];
+        let mut beyond = vec![[0.0, 1.0]; points.len()];
         let mut out = Deformed::default();
-        self.configure(initial, &mut out, |n, origin, way| {
-            let square = way.norm_squared();
-            along[n] = if square > 1e-12 { (points[n] - origin).dot(&way) / square } else { 1.0 };
+        self.configure(initial, &mut out, |n, passed, direction, length| {
+            beyond[n] = [(points[n] - passed).dot(&direction), length.max(1e-6)];
             points[n]
         });
-        self.along = along;
+        self.beyond = beyond;
     }
 
-    /// Configures the rays in `pose` in the order of their needs; `place` answers with the point on the ray of a node from its
-    /// origin and the way to the point that it passes (a unit vector on a ring). Returns `posed_from_rest` of the extremities.
+    /// Configures the rays in `pose` in the order of their needs; `place` answers with the point on the ray of a node from
+    /// what the ray passes (on a ring, its origin), its direction and its length up to there (on a ring, 1). Returns `posed_from_rest` of the extremities.
     fn configure(
         &self,
         pose: &Pose,
         out: &mut Deformed,
-        mut place: impl FnMut(usize, Point3<f64>, Vector3<f64>) -> Point3<f64>,
+        mut place: impl FnMut(usize, Point3<f64>, Vector3<f64>, f64) -> Point3<f64>,
     ) -> [Isometry3<f64>; 5] {
         let bones = Bones::new(&self.body.skeleton, pose);
         let extremities = std::array::from_fn(|k| self.rigid_motion(&bones, joint_of(k)));
@@ -132,7 +135,7 @@ impl RealTime {
         out.origins.resize(self.plan.nodes.len(), Point3::origin());
         for &n in self.plan.phases.iter().flatten() {
             let n = n as usize;
-            let (origin, way) = match &self.plan.nodes[n].rule {
+            let (origin, passed) = match &self.plan.nodes[n].rule {
                 Rule::Rim { .. } => {
                     let (rest, of) = &self.rims[n];
                     (out.nodes[n], out.origins[n]) =
@@ -142,24 +145,26 @@ impl RealTime {
                 Rule::Ring { section, .. } => {
                     let (plane, x, y) = &planes[*section as usize];
                     let [cosine, sine] = self.turns[n];
-                    (plane.origin, x * cosine + y * sine)
+                    out.origins[n] = plane.origin;
+                    out.nodes[n] = place(n, plane.origin, x * cosine + y * sine, 1.0);
+                    continue;
                 }
                 Rule::Between { start, goal, share, link } => {
                     let ends = (bones.at(link.0), bones.at(link.1));
                     let (start, goal) = (&out.nodes[*start as usize], &out.nodes[*goal as usize]);
-                    let (origin, passed) = boundary::ray(start, goal, *share, ends);
-                    (origin, passed - origin)
+                    boundary::ray(start, goal, *share, ends)
                 }
                 Rule::Span(weights) => {
                     let sum = |of: &[Point3<f64>]| {
                         Point3::from(weights.iter().map(|(n, w)| of[*n as usize].coords * *w).sum::<Vector3<f64>>())
                     };
-                    let origin = sum(&out.origins);
-                    (origin, sum(&out.nodes) - origin)
+                    (sum(&out.origins), sum(&out.nodes))
                 }
             };
             out.origins[n] = origin;
-            out.nodes[n] = place(n, origin, way);
+            let (way, length) = (passed - origin, (passed - origin).norm());
+            let direction = if length > 1e-6 { way / length } else { Vector3::zeros() };
+            out.nodes[n] = place(n, passed, direction, length);
         }
         extremities
     }

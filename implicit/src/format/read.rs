@@ -49,9 +49,9 @@ struct PrimitiveText {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StateText {
-    center: [f64; 3],
+    center: Option<[f64; 3]>,
     axes: Spanned<[f64; 3]>,
-    turn: [f64; 3],
+    turn: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize)]
@@ -169,7 +169,7 @@ impl Reader<'_> {
         }
         let state = self.state(&text.center, &text.axes, &text.turn)?;
         let groups = self.groups(joint, text.groups.as_ref())?;
-        let deform = text.muscle.as_ref().map(|m| self.muscle(m)).transpose()?;
+        let deform = text.muscle.as_ref().map(|m| self.muscle(m, text)).transpose()?;
         Ok(Primitive { name: text.name.clone(), joint, kind, weight, state, groups, deform })
     }
 
@@ -205,7 +205,7 @@ impl Reader<'_> {
         Ok(groups)
     }
 
-    fn muscle(&self, text: &MuscleText) -> Result<Deform, ImplicitError> {
+    fn muscle(&self, text: &MuscleText, relaxed: &PrimitiveText) -> Result<Deform, ImplicitError> {
         let reference = self.joint(&text.reference)?;
         let limits = text.limits.get_ref().map(f64::to_radians);
         let ascending = limits[0] <= limits[1] && limits[1] <= limits[2] && limits[0] < limits[2];
@@ -217,7 +217,8 @@ impl Reader<'_> {
         let axis = axis.filter(|a| a.iter().all(|c| c.is_finite()));
         let axis =
             axis.ok_or_else(|| self.wrong(&text.axis.span(), "`axis` must be a direction other than 0, 0, 0"))?;
-        let state = |s: &StateText| self.state(&s.center, &s.axes, &s.turn);
+        let state =
+            |s: &StateText| self.state(&s.center.unwrap_or(relaxed.center), &s.axes, &s.turn.unwrap_or(relaxed.turn));
         let blending = match &text.blending {
             None => crate::deform::Blending::default(),
             Some(name) => name.get_ref().parse().map_err(|e| self.wrong(&name.span(), e))?,

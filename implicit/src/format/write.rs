@@ -64,7 +64,10 @@ fn primitive(out: &mut String, p: &Primitive) {
         let limits = Vector3::from(m.limits).map(f64::to_degrees);
         let state = |s: &State| {
             let (center, axes, turn) = numbers(s);
-            format!("{{ center = {center}, axes = {axes}, turn = {turn} }}")
+            let (own_center, _, own_turn) = numbers(&p.state);
+            let center = if center == own_center { String::new() } else { format!("center = {center}, ") };
+            let turn = if turn == own_turn { String::new() } else { format!(", turn = {turn}") };
+            format!("{{ {center}axes = {axes}{turn} }}")
         };
         let _ = write!(
             out,
