@@ -33,11 +33,14 @@ pub struct RealTime {
     /// Cosine and sine of the angle of a ring's point.
     turns: Vec<[f64; 2]>,
     /// Points of head, hands and feet at rest, each with its extremity.
-    rigid: Vec<(Point3<f32>, u8)>,
+    rigid: Vec<RigidPoint>,
     /// The points of the plan's rims at rest.
     rims: Vec<(Point3<f64>, u8)>,
     triangles: Vec<[u32; 3]>,
 }
+
+/// A point at rest, and the extremity that it moves with.
+type RigidPoint = (Point3<f32>, u8);
 
 /// Points of one body, kept from frame to frame.
 #[derive(Debug, Clone, Default)]
@@ -98,7 +101,7 @@ impl RealTime {
         });
         out.positions.clear();
         out.positions.extend(out.nodes[..self.plan.count].iter().map(|p| p.cast::<f32>()));
-        let rigid: [Isometry3<f32>; 5] = frames.map(|f| f.cast());
+        let rigid: [Isometry3<f32>; 5] = frames.map(Isometry3::<f64>::cast);
         out.positions.extend(self.rigid.iter().map(|(p, of)| rigid[*of as usize] * p));
     }
 
@@ -175,7 +178,7 @@ impl RealTime {
 }
 
 /// Head, hands and feet, coarser at coarser levels, and all triangles: contours, extremities and what joins them.
-fn surface(envelope: &Envelope, nodes: &[Point3<f64>], level: Level) -> (Vec<(Point3<f32>, u8)>, Vec<[u32; 3]>) {
+fn surface(envelope: &Envelope, nodes: &[Point3<f64>], level: Level) -> (Vec<RigidPoint>, Vec<[u32; 3]>) {
     let count = envelope.plan.count;
     let share = (level.half_trunk as f64 / LEVELS[0].half_trunk as f64).powi(2);
     let mut positions: Vec<Point3<f32>> = nodes[..count].iter().map(|p| p.cast()).collect();

@@ -95,12 +95,11 @@ pub fn shape(out: &Path, options: &ShapeOptions, observer: &dyn Observer) -> Res
     Ok(ShapedAvatar { files, shaped, crossing, remarks })
 }
 
+/// A shaped body, the avatar of it, and pairs of triangles of each garment that cross a layer below.
+type Worn = (Shaped, Avatar, Vec<(String, usize)>);
+
 /// A body that is nobody's, standing on the floor in the A-pose.
-fn of_nobody(
-    model: &BodyModel,
-    options: &ShapeOptions,
-    out: &Path,
-) -> Result<(Shaped, Avatar, Vec<(String, usize)>), PipelineError> {
+fn of_nobody(model: &BodyModel, options: &ShapeOptions, out: &Path) -> Result<Worn, PipelineError> {
     let search = |start| ShapeSearch::new(model, start);
     let shaped = match options.is_woman {
         Some(is_woman) => {
@@ -117,11 +116,7 @@ fn of_nobody(
 }
 
 /// A subject's body with its garments, in the pose of the first scan, soles where they were.
-fn of_subject(
-    run: &Run,
-    model: &BodyModel,
-    options: &ShapeOptions,
-) -> Result<(Shaped, Avatar, Vec<(String, usize)>), PipelineError> {
+fn of_subject(run: &Run, model: &BodyModel, options: &ShapeOptions) -> Result<Worn, PipelineError> {
     let folders = &run.folders;
     let body = Body::load(folders, run.first_layer(), model)?;
     let path = folders.body_json();
