@@ -9,6 +9,9 @@ pub enum FittingError {
     /// The mesh to be posed cannot be used.
     #[error("mesh to pose: {0}")]
     Mesh(String),
+    /// A measure that was asked for is none, or nobody has it.
+    #[error("{0}")]
+    Measure(String),
     /// A setting is out of its range.
     #[error("setting {name}: {reason}")]
     Setting {

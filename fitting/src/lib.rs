@@ -7,10 +7,12 @@
 //! - [`pose_under`]: any skinned mesh posed inside a more dressed scan (eq. 5 and 6);
 //! - [`pose_as_worn`]: which of several takes a scan shows again;
 //! - [`settle_under`]: the body in that pose, hands turned to the scan, drawn inside it;
+//! - [`ShapeSearch`]: a body by its measures, without a scan;
 //! - [`measure_table`]: the measurements of ISO 8559-1; [`measure_extremes`]: stature and the girths that bodies are scored by.
 //!
 //! A fit that should not be trusted is a result with a [`Verdict`]; having no answer is a [`FittingError`].
 
+mod by_measures;
 mod conform;
 mod error;
 mod fit;
@@ -24,6 +26,7 @@ mod surface;
 mod under;
 
 pub use {
+    by_measures::{ALIASES, Conflict, Reached, ShapeSearch, Shaped, Start, Wanted, shape_either},
     conform::ScanLandmark,
     error::FittingError,
     fit::{BodyFit, DistanceStats, FitReport, Mend, PartShown, Verdict, find_upright, fit_body, take_on_bare_skin},

@@ -15,6 +15,8 @@
 //! [`carry_weights`] gives layers that lie close over one another like weights, and none that a stride tears. `worn` examines
 //! the result: [`posed_report`] poses the layers, [`hidden_triangles`] finds triangles that are never in sight.
 //!
+//! [`follow()`] takes all of them along where the body's shape is changed.
+//!
 //! The seed's own way stays selectable: [`Labelling::NearestBodyVertex`] and [`StackMethod::PushAlongNormal`].
 //!
 //! ```
@@ -26,6 +28,7 @@
 mod edits;
 mod error;
 mod extract;
+mod follow;
 mod hem;
 mod labels;
 mod measure;
@@ -45,6 +48,7 @@ pub use edits::{
 };
 pub use error::GarmentError;
 pub use extract::{Extraction, extract, find_cloth};
+pub use follow::follow;
 pub use labels::{
     template::cloth_thickness,
     types::{Labels, Reason},

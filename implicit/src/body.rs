@@ -15,6 +15,8 @@ pub struct ImplicitBody {
     pub skeleton: Skeleton,
     /// Coefficients of the body model that head, hands and feet are taken from.
     pub beta: Vec<f64>,
+    /// Size of head, hands and feet beside those of the body model with these coefficients.
+    pub scale: f64,
     /// The primitives.
     pub primitives: Vec<Primitive>,
 }

@@ -30,6 +30,8 @@ pub struct Envelope {
     /// How the skin relates to the sampled points.
     pub through: Through,
     patches: Patches,
+    /// How far beyond the point that its ray passes each point of a contour lies at rest; empty where there are no primitives yet.
+    at_rest: Vec<f64>,
 }
 
 /// A sampled surface.
@@ -47,10 +49,11 @@ impl Envelope {
     /// # Errors
     /// [`ImplicitError`] where the template lacks what the plan starts from, or joints do not stand as a person's do.
     pub fn new(model: &BodyModel, body: &ImplicitBody, level: Level) -> Result<Self, ImplicitError> {
-        let extremities = Extremities::new(model, &body.beta, &body.skeleton)?;
-        let plan = Plan::new(model, &body.beta, &body.skeleton, &extremities, level)?;
+        let extremities = Extremities::new(model, body)?;
+        let plan = Plan::new(model, body, &extremities, level)?;
         let patches = Patches::new(plan.count, &plan.quads);
-        let mut envelope = Self { plan, extremities, triangles: Vec::new(), through: Through::default(), patches };
+        let (through, at_rest) = (Through::default(), Vec::new());
+        let mut envelope = Self { plan, extremities, triangles: Vec::new(), through, patches, at_rest };
         envelope.join(body);
         Ok(envelope)
     }
@@ -69,13 +72,16 @@ impl Envelope {
             triangles.extend(gap);
         }
         self.triangles = triangles;
+        if !body.primitives.is_empty() {
+            self.at_rest = contours.beyond();
+        }
     }
 
     /// The contours of `body`'s skeleton in `pose` on any shape.
     pub fn contours(&self, body: &ImplicitBody, pose: &Pose, surface: &dyn Surface) -> Contours {
         let posed = self.extremities.posed(pose);
         let rims = std::array::from_fn(|k| self.extremities.rim(k, &posed));
-        sample(&self.plan, &Bones::new(&body.skeleton, pose), &rims, surface)
+        sample(&self.plan, &Bones::new(&body.skeleton, pose), &rims, &self.at_rest, surface)
     }
 
     /// The surface of `body` in `pose`, sampled from its primitives.
@@ -87,7 +93,7 @@ impl Envelope {
     pub fn sample_on(&self, body: &ImplicitBody, pose: &Pose, surface: &dyn Surface) -> Sampled {
         let posed = self.extremities.posed(pose);
         let rims = std::array::from_fn(|k| self.extremities.rim(k, &posed));
-        let contours = sample(&self.plan, &Bones::new(&body.skeleton, pose), &rims, surface);
+        let contours = sample(&self.plan, &Bones::new(&body.skeleton, pose), &rims, &self.at_rest, surface);
         let mesh = Mesh::new(self.positions(&contours, &posed), self.triangles.clone());
         Sampled { mesh, missed: contours.missed }
     }

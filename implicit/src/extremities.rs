@@ -1,16 +1,18 @@
 //! Head, hands and feet: rigid but for their joints, taken from the template body (paper 002 §3 and §4.1).
 
 use nalgebra::Point3;
-use toile_character::{BodyModel, Joint, Pose, Region, Skeleton, SkinnedMesh, skinning};
+use toile_character::{BodyModel, Joint, Pose, Region, SkinnedMesh, skinning};
 use toile_geometry::{Mesh, topology::boundary_loops};
 
-use crate::ImplicitError;
+use crate::{ImplicitError, body::ImplicitBody};
 
 /// Head, hands and feet of one person.
 #[derive(Debug, Clone)]
 pub struct Extremities {
     /// Their surface at rest with its weights, vertex order of the template.
     pub skin: SkinnedMesh,
+    /// Which extremity each vertex is of, as in [`EXTREMITIES`].
+    pub parts: Vec<u8>,
     /// The rim of each: vertices in order around it.
     pub rims: [Vec<u32>; 5],
 }
@@ -25,11 +27,12 @@ pub fn joint_of(extremity: usize) -> Joint {
 }
 
 impl Extremities {
-    /// Of the body with coefficients `beta`, on the joints of `skeleton` (at rest).
+    /// Of `body`: those of the model with its coefficients, `scale` times as large, on its joints at rest.
     ///
     /// # Errors
     /// [`ImplicitError::Body`] where the template's head, hands or feet do not have one rim each.
-    pub fn new(model: &BodyModel, beta: &[f64], skeleton: &Skeleton) -> Result<Self, ImplicitError> {
+    pub fn new(model: &BodyModel, body: &ImplicitBody) -> Result<Self, ImplicitError> {
+        let (beta, skeleton) = (&body.beta[..], &body.skeleton);
         let whole = Mesh::new(model.shape(beta), model.triangles.clone());
         let is_part = |t: usize| model.triangles[t].iter().all(|&v| model.regions[v as usize].is_extremity());
         let (mut mesh, old_of_new) = whole.filter_triangles(is_part);
@@ -37,7 +40,8 @@ impl Extremities {
         for (p, &old) in mesh.positions.iter_mut().zip(&old_of_new) {
             // the person's own joints may lie beside those of the model
             let joint = joint_of(extremity_of(model.regions[old as usize]));
-            *p += (skeleton.position(joint) - own.position(joint)).cast::<f32>();
+            let offset = p.cast::<f64>() - own.position(joint);
+            *p = (skeleton.position(joint) + offset * body.scale).cast();
         }
         let mut rims: [Vec<u32>; 5] = Default::default();
         for rim in boundary_loops(&mesh.triangles) {
@@ -52,7 +56,8 @@ impl Extremities {
             return Err(ImplicitError::Body(reason));
         }
         let weights = model.weights.gather(&old_of_new);
-        Ok(Self { skin: SkinnedMesh::new(mesh, skeleton.clone(), weights)?, rims })
+        let parts = old_of_new.iter().map(|&v| extremity_of(model.regions[v as usize]) as u8).collect();
+        Ok(Self { skin: SkinnedMesh::new(mesh, skeleton.clone(), weights)?, parts, rims })
     }
 
     /// Their vertices in `pose`.

@@ -194,7 +194,14 @@ mod tests {
 
     fn body(primitives: Vec<Primitive>) -> ImplicitBody {
         let skeleton = BodyModel::load_default().unwrap().mean_skeleton;
-        ImplicitBody { name: "balls".into(), field: FieldFunction::Wyvill, skeleton, beta: Vec::new(), primitives }
+        ImplicitBody {
+            name: "balls".into(),
+            field: FieldFunction::Wyvill,
+            skeleton,
+            beta: Vec::new(),
+            scale: 1.0,
+            primitives,
+        }
     }
 
     fn ball(joint: Joint, x: f64, axes: [f64; 3]) -> Primitive {

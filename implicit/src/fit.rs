@@ -15,7 +15,10 @@ mod stray;
 use toile_character::{BodyModel, Pose, SkinnedMesh};
 
 use self::{samples::Samples, solve::Problem};
-use crate::{ImplicitError, body::ImplicitBody, envelope::Envelope, field_function::FieldFunction, level::LEVELS};
+use crate::{
+    ImplicitError, body::ImplicitBody, envelope::Envelope, field_function::FieldFunction, level::LEVELS,
+    muscles::name_muscles,
+};
 
 /// How primitives are fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +76,7 @@ pub fn fit(
     settings: &FitSettings,
 ) -> Result<Fitted, ImplicitError> {
     let (name, skeleton, beta) = (name.to_string(), body.skeleton.clone(), beta.to_vec());
-    let mut fitted = ImplicitBody { name, field: settings.field, skeleton, beta, primitives: Vec::new() };
+    let mut fitted = ImplicitBody { name, field: settings.field, skeleton, beta, scale: 1.0, primitives: Vec::new() };
     let envelope = Envelope::new(model, &fitted, LEVELS[0])?;
     let samples = Samples::new(&envelope, &fitted, body, poses);
     fitted.primitives = start::primitives(&fitted, &samples);
@@ -92,6 +95,7 @@ pub fn fit(
         fitted.primitives.extend(add::primitives(&fitted, &samples, &errors, batch));
         iterations = NEXT_ITERATIONS;
     }
+    name_muscles(&mut fitted);
     Ok(Fitted { body: fitted, steps })
 }
 

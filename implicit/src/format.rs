@@ -5,6 +5,7 @@
 //! name = "anna"
 //! field = "wyvill"             # or "nishimura"
 //! beta = [0.84, -0.93]         # of the body model: head, hands and feet
+//! scale = 1.0                  # of their size; 1 where it is left out
 //!
 //! [joints]                     # at rest in the A-pose, metres; fingers follow their hand
 //! hips = [0.0, 0.951, 0.008]
@@ -19,7 +20,7 @@
 //! kind = "metaball"            # or "ellipsoid", which does not blend
 //! groups = ["left_upper_arm"]  # that of its joint where they are left out; ["root"] blends with all
 //!
-//! [primitive.muscle]
+//! [primitive.muscle]           # center and turn of min and max are those at rest where they are left out
 //! reference = "leftLowerArm"
 //! axis = [0.0, 1.0, 0.0]
 //! limits = [-10.0, 0.0, 145.0] # lowest angle, relaxed, highest; degrees
@@ -31,7 +32,10 @@
 mod read;
 mod write;
 
-pub use self::{read::read, write::write};
+pub use self::{
+    read::{read, read_primitive},
+    write::write,
+};
 
 /// The version of the format.
 const FORMAT: u32 = 1;
@@ -103,6 +107,7 @@ blending = "parabolic"
             ("\"left_shoulder\"", "\"left_wing\"", 23, "`left_wing` is no group"),
             ("limits = [-10.0, 0.0, 145.0]", "limits = [145.0, 0.0, -10.0]", 27, "must ascend"),
             ("axis = [0.0, 1.0, 0.0]", "axis = [0.0, 0.0, 0.0]", 26, "direction"),
+            ("beta = [0.5, -1.0]", "beta = [0.5, -1.0]\nscale = 0.0", 5, "between 0.1"),
             ("weight = 0.5", "weight = 0.0", 22, "other than 0"),
             ("weight = 0.5", "wait = 0.5", 22, "unknown field"),
             ("format = 1", "format = 7", 1, "format 7"),

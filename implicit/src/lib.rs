@@ -6,6 +6,7 @@
 //! - [`Field`]: their sum in a pose, and where rays leave it (§1, §2);
 //! - [`plan`]: which rays are cast from the links, driven by joint angles ([`bones`]) or by rims ([`boundary`]; §2.1, §2.2);
 //! - [`Envelope`]: contours, the B-spline skin over them ([`spline`]), head, hands and feet stitched to it (§3); [`Level`]s of detail (§4.3);
+//! - [`RealTime`]: contours deformed directly, for crowds (§4); [`Scaling`]: other sizes and proportions (§5); [`Edit`]: changes by hand;
 //! - [`fit`](mod@fit): primitives fitted to a person's body by themselves.
 //!
 //! ```no_run
@@ -26,6 +27,7 @@ pub mod bones;
 pub mod boundary;
 pub mod contours;
 mod deform;
+mod edit;
 mod envelope;
 mod error;
 pub mod extremities;
@@ -35,8 +37,11 @@ pub mod fit;
 pub mod format;
 mod group;
 mod level;
+mod muscles;
 pub mod plan;
 mod primitive;
+mod real_time;
+mod scaling;
 pub mod spline;
 mod state;
 pub mod stitch;
@@ -45,6 +50,7 @@ pub mod target;
 
 pub use body::ImplicitBody;
 pub use deform::{Blending, Deform};
+pub use edit::Edit;
 pub use envelope::{Envelope, Sampled};
 pub use error::ImplicitError;
 pub use field::Field;
@@ -52,5 +58,7 @@ pub use field_function::{FieldFunction, THRESHOLD};
 pub use group::{Group, Groups};
 pub use level::{LEVELS, Level};
 pub use primitive::{Kind, Primitive};
+pub use real_time::{Deformed, RealTime};
+pub use scaling::{Dimensions, Scaling};
 pub use state::State;
 pub use surface::{Ray, Surface};

@@ -12,11 +12,12 @@ mod marks;
 mod trunk;
 
 use nalgebra::{Point3, Vector3};
-use toile_character::{BodyModel, Skeleton};
+use toile_character::BodyModel;
 
 pub use self::marks::Marks;
 use crate::{
     ImplicitError,
+    body::ImplicitBody,
     bones::{Bones, Chain, Place},
     boundary::OnContour,
     extremities::Extremities,
@@ -109,19 +110,18 @@ struct Draft<'a> {
 }
 
 impl Plan {
-    /// The plan for a person whose joints rest at `skeleton`.
+    /// The plan for `body`.
     ///
     /// # Errors
     /// [`ImplicitError::Body`] where the template lacks a landmark, or the skeleton is not that of a person.
     pub fn new(
         model: &BodyModel,
-        beta: &[f64],
-        skeleton: &Skeleton,
+        body: &ImplicitBody,
         extremities: &Extremities,
         level: Level,
     ) -> Result<Self, ImplicitError> {
-        let bones = Bones::new(skeleton, &toile_character::Pose::identity());
-        let marks = Marks::new(model, beta, &bones)?;
+        let bones = Bones::new(&body.skeleton, &toile_character::Pose::identity());
+        let marks = Marks::new(model, body, &bones)?;
         let plan = Self {
             level,
             nodes: Vec::new(),

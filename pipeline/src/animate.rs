@@ -20,7 +20,6 @@ use std::path::{Component, Path, PathBuf};
 use toile_animation::resample;
 use toile_capture::printable;
 use toile_character::{BodyModel, Motion};
-use toile_garments::ExtractionReport;
 
 use self::{fabrics::Fabrics, inputs::Baking};
 pub use self::{
@@ -28,15 +27,15 @@ pub use self::{
     report::AnimationReport,
 };
 use crate::{
-    Goal, Observer, Options, PipelineError, Record, Run,
+    Goal, Observer, Options, PipelineError, Run,
     avatar_choice::AvatarChoice,
     body_file::Body,
-    garment::Garment,
+    garment::{self, Garment},
     options::MotionChoice,
     process::process,
-    record, settings,
-    step::{Remarks, Step},
-    steps::{cut::Cut, export},
+    settings,
+    step::Remarks,
+    steps::export,
 };
 
 /// Expected seconds a frame of a garment.
@@ -69,7 +68,7 @@ pub fn animate(root: &Path, options: &AnimateOptions, observer: &dyn Observer) -
     let model = BodyModel::load_default()?;
     let body = Body::load(&run.folders, run.first_layer(), &model)?;
     let choice = AvatarChoice::read(&run.folders)?;
-    let garments = garments(&run)?;
+    let garments = garment::stacked(&run)?;
     let export = export::Export { run: &run, body: &body, garments: &garments, choice: &choice };
     let path = match &options.motion {
         MotionChoice::AsBefore => choice.motion_path(&run.folders),
@@ -109,19 +108,6 @@ fn folder(run: &Run, motion: &Motion) -> Result<PathBuf, PipelineError> {
             Err(PipelineError::refused(&all, reason))
         }
     }
-}
-
-/// The garments that the last run stacked.
-fn garments(run: &Run) -> Result<Vec<Garment>, PipelineError> {
-    let mut out = Vec::new();
-    for number in run.first_garment()..run.layers.len() {
-        let folder = run.folders.layer(&run.layers[number]);
-        let cut: Option<Record<ExtractionReport>> = record::read(&folder, Cut::NAME)?;
-        if let Some(cut) = cut.filter(|_| run.folders.garment(&run.layers[number]).is_file()) {
-            out.push(Garment::new(run, number, &cut.result)?);
-        }
-    }
-    Ok(out)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use toile_garments::{ExtractionReport, GarmentType, cloth_thickness};
 
-use crate::{PipelineError, Run};
+use crate::{PipelineError, Record, Run, record, step::Step, steps::cut::Cut};
 
 /// No cloth is taken for thicker, millimetres: stacking looks twice as far for the layers below.
 const THICKEST_MM: f32 = 10.0;
@@ -42,6 +42,22 @@ impl Garment {
         let name = if layer == BODY_TAKE { CLOTHES.into() } else { layer.clone() };
         Ok(Self { number, garment_type, thickness, layer, name })
     }
+}
+
+/// The garments that the last run stacked.
+///
+/// # Errors
+/// [`PipelineError`] where a record cannot be read.
+pub fn stacked(run: &Run) -> Result<Vec<Garment>, PipelineError> {
+    let mut out = Vec::new();
+    for number in run.first_garment()..run.layers.len() {
+        let folder = run.folders.layer(&run.layers[number]);
+        let cut: Option<Record<ExtractionReport>> = record::read(&folder, Cut::NAME)?;
+        if let Some(cut) = cut.filter(|_| run.folders.garment(&run.layers[number]).is_file()) {
+            out.push(Garment::new(run, number, &cut.result)?);
+        }
+    }
+    Ok(out)
 }
 
 /// Thickness of the cloth of take `number`'s garment, as `subject.toml` gives it, metres.

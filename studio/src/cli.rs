@@ -58,6 +58,8 @@ pub enum Command {
     Animate(commands::animate::Animate),
     /// The body as implicit primitives: a compact body that can be edited
     Sculpt(commands::sculpt::Sculpt),
+    /// A body by its measures, without a scan; or a subject with other measures
+    Shape(commands::shape::Shape),
     /// Everything from recorded takes to avatar and report: runs whatever is missing
     Process(commands::process::Process),
     /// Process a whole archive: what is stale, side by side

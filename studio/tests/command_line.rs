@@ -24,6 +24,7 @@ fn help_shows_the_usual_way_and_every_command_has_an_example() {
         "export",
         "animate",
         "sculpt",
+        "shape",
         "measure",
         "capture",
         "devices",

@@ -24,6 +24,7 @@ struct BodyText {
     name: String,
     field: Spanned<String>,
     beta: Spanned<Vec<f64>>,
+    scale: Option<Spanned<f64>>,
     joints: BTreeMap<Spanned<String>, Spanned<[f64; 3]>>,
     #[serde(default, rename = "primitive")]
     primitives: Vec<Spanned<PrimitiveText>>,
@@ -37,6 +38,7 @@ struct PrimitiveText {
     joint: Spanned<String>,
     center: [f64; 3],
     axes: Spanned<[f64; 3]>,
+    #[serde(default)]
     turn: [f64; 3],
     weight: Option<Spanned<f64>>,
     kind: Option<Spanned<String>>,
@@ -47,9 +49,9 @@ struct PrimitiveText {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StateText {
-    center: [f64; 3],
+    center: Option<[f64; 3]>,
     axes: Spanned<[f64; 3]>,
-    turn: [f64; 3],
+    turn: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize)]
@@ -82,12 +84,35 @@ pub fn read(text: &str, model: &BodyModel) -> Result<ImplicitBody, ImplicitError
         return Err(reader.wrong(&parsed.beta.span(), reason));
     }
     let field = parsed.field.get_ref().parse().map_err(|e| reader.wrong(&parsed.field.span(), e))?;
+    let scale = parsed.scale.as_ref().map_or(1.0, |s| *s.get_ref());
+    if let Some(given) = parsed.scale.as_ref().filter(|_| !(0.1..=10.0).contains(&scale)) {
+        return Err(reader.wrong(&given.span(), "`scale` must be a number between 0.1 and 10"));
+    }
     let skeleton = reader.skeleton(&parsed.joints, model, &beta)?;
     let primitives: Result<Vec<Primitive>, ImplicitError> =
         parsed.primitives.iter().map(|p| reader.primitive(p.get_ref())).collect();
-    let body = ImplicitBody { name: parsed.name, field, skeleton, beta, primitives: primitives? };
+    let body = ImplicitBody { name: parsed.name, field, skeleton, beta, scale, primitives: primitives? };
     body.validate()?;
     Ok(body)
+}
+
+/// Reads one primitive from the inside of a table: `joint = "hips", center = [0, 0, 0], axes = [100, 90, 80]`.
+///
+/// # Errors
+/// [`ImplicitError::Body`] repeats the words and says what is wrong with them.
+pub fn read_primitive(words: &str) -> Result<Primitive, ImplicitError> {
+    #[derive(Deserialize)]
+    struct Words {
+        words: PrimitiveText,
+    }
+    let text = format!("words = {{ {words} }}");
+    let reader = Reader { text: &text };
+    let wrong = |reason: String| ImplicitError::Body(format!("`{words}`: {reason}"));
+    let parsed: Words = toml::from_str(&text).map_err(|e| wrong(e.message().trim().replace('\n', " ")))?;
+    reader.primitive(&parsed.words).map_err(|e| match e {
+        ImplicitError::Line { reason, .. } => wrong(reason),
+        other => other,
+    })
 }
 
 struct Reader<'a> {
@@ -144,7 +169,7 @@ impl Reader<'_> {
         }
         let state = self.state(&text.center, &text.axes, &text.turn)?;
         let groups = self.groups(joint, text.groups.as_ref())?;
-        let deform = text.muscle.as_ref().map(|m| self.muscle(m)).transpose()?;
+        let deform = text.muscle.as_ref().map(|m| self.muscle(m, text)).transpose()?;
         Ok(Primitive { name: text.name.clone(), joint, kind, weight, state, groups, deform })
     }
 
@@ -180,7 +205,7 @@ impl Reader<'_> {
         Ok(groups)
     }
 
-    fn muscle(&self, text: &MuscleText) -> Result<Deform, ImplicitError> {
+    fn muscle(&self, text: &MuscleText, relaxed: &PrimitiveText) -> Result<Deform, ImplicitError> {
         let reference = self.joint(&text.reference)?;
         let limits = text.limits.get_ref().map(f64::to_radians);
         let ascending = limits[0] <= limits[1] && limits[1] <= limits[2] && limits[0] < limits[2];
@@ -192,7 +217,8 @@ impl Reader<'_> {
         let axis = axis.filter(|a| a.iter().all(|c| c.is_finite()));
         let axis =
             axis.ok_or_else(|| self.wrong(&text.axis.span(), "`axis` must be a direction other than 0, 0, 0"))?;
-        let state = |s: &StateText| self.state(&s.center, &s.axes, &s.turn);
+        let state =
+            |s: &StateText| self.state(&s.center.unwrap_or(relaxed.center), &s.axes, &s.turn.unwrap_or(relaxed.turn));
         let blending = match &text.blending {
             None => crate::deform::Blending::default(),
             Some(name) => name.get_ref().parse().map_err(|e| self.wrong(&name.span(), e))?,

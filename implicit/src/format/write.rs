@@ -26,11 +26,15 @@ pub fn write(body: &ImplicitBody) -> String {
     // writing into a string cannot fail
     let _ = write!(
         out,
-        "format = {FORMAT}\nname = {}\nfield = \"{}\"\nbeta = [{}]\n\n[joints]\n",
+        "format = {FORMAT}\nname = {}\nfield = \"{}\"\nbeta = [{}]\n",
         quoted(&body.name),
         body.field,
         beta.join(", ")
     );
+    if (body.scale - 1.0).abs() > 5e-5 {
+        let _ = writeln!(out, "scale = {}", short(body.scale, 4));
+    }
+    out.push_str("\n[joints]\n");
     for joint in JOINTS.into_iter().filter(|j| !j.is_finger()) {
         let at = body.skeleton.position(joint).coords;
         let _ = writeln!(out, "{} = {}", joint.name(), triple(&at, 4));
@@ -60,7 +64,10 @@ fn primitive(out: &mut String, p: &Primitive) {
         let limits = Vector3::from(m.limits).map(f64::to_degrees);
         let state = |s: &State| {
             let (center, axes, turn) = numbers(s);
-            format!("{{ center = {center}, axes = {axes}, turn = {turn} }}")
+            let (own_center, _, own_turn) = numbers(&p.state);
+            let center = if center == own_center { String::new() } else { format!("center = {center}, ") };
+            let turn = if turn == own_turn { String::new() } else { format!(", turn = {turn}") };
+            format!("{{ {center}axes = {axes}{turn} }}")
         };
         let _ = write!(
             out,

@@ -28,6 +28,7 @@ pub mod reorder;
 pub mod sculpt;
 pub mod serve;
 pub mod settings;
+pub mod shape;
 mod springs;
 pub mod synthesize;
 pub mod texture_size;

@@ -25,7 +25,7 @@ const TABLE: &[Row] = &[
     row("texture", &["geometry", "capture"], &[]),
     row("calibration", &["geometry"], &["outside"]),
     row("character", &["geometry"], &["outside"]),
-    row("implicit", &["geometry", "character"], &[]),
+    row("implicit", &["geometry", "character"], &["animation", "outside"]),
     row("fitting", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("garments", &["geometry", "character"], &["animation", "outside", "synthetic"]),
     row("cloth", &["geometry"], &[]),
