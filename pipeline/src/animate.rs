@@ -27,19 +27,13 @@ pub use self::{
     report::AnimationReport,
 };
 use crate::{
-    Goal, Observer, Options, PipelineError, Run,
-    avatar_choice::AvatarChoice,
-    body_file::Body,
-    garment::{self, Garment},
-    options::MotionChoice,
-    process::process,
-    settings,
-    step::Remarks,
-    steps::export,
+    Goal, Observer, Options, PipelineError, Run, avatar_choice::AvatarChoice, body_file::Body, garment,
+    options::MotionChoice, process::process, settings, step::Remarks, steps::export,
 };
 
 /// Expected seconds a frame of a garment.
 const SECONDS: f64 = 0.15;
+
 /// What was written.
 #[derive(Debug)]
 pub struct Animated {

@@ -14,6 +14,7 @@ use super::{
     endless::LeadIn,
     inputs::Baking,
     mover::Mover,
+    options::Profile,
     pictures::Pictures,
     playable,
     report::{AnimationReport, FrameReport},
@@ -56,7 +57,10 @@ impl Baking<'_> {
             caches.add(mover.layers())?;
             let of_frame = FrameReport::of(&outfit, mover.layers(), mover.crossing(), milliseconds);
             report.frames.push(FrameReport { jumped: mover.jumped(), ..of_frame });
-            checkpoints.at(&mut caches, &mover, &report.frames, k + 1 == count)?;
+            // In real time frames are made sooner than they are kept.
+            if self.options.profile == Profile::Bake {
+                checkpoints.at(&mut caches, &mover, &report.frames, k + 1 == count)?;
+            }
             self.observer.at((k + 1) as f32 / count as f32);
         }
         report.sum_up();

@@ -11,6 +11,7 @@ use super::{
     endless::LeadIn,
     inputs::Baking,
     mover::Mover,
+    options::{AnimateOptions, Profile},
     pictures::{FILM_LIMIT, film_frames, portrait},
     report::{AnimationReport, Variant},
 };
@@ -73,7 +74,8 @@ fn moved(
     shown: &[usize],
 ) -> Result<(Variant, Vec<RgbImage>), PipelineError> {
     let wrong = |e: toile_animation::AnimationError| PipelineError::stage(baking.folder, e);
-    let mut mover = Mover::new(outfit, blend, baking.options.skinning);
+    let options = AnimateOptions { profile: Profile::Bake, blend, ..baking.options.clone() };
+    let mut mover = Mover::new(outfit, &options).map_err(wrong)?;
     mover.start(&baking.avatar.pose0, baking.motion, lead_in).map_err(wrong)?;
     let (mut times, mut crossing, mut pictures) = (Vec::new(), 0, Vec::with_capacity(shown.len()));
     let poses = &baking.motion.poses;

@@ -44,9 +44,9 @@ pub struct Animate {
     /// As well as can be, or as fast as a screen needs
     #[arg(long, value_enum, default_value_t = Time::Bake)]
     profile: Time,
-    /// What moves the garments in the profile bake
-    #[arg(long, value_enum, default_value_t = Way::Anchored)]
-    blend: Way,
+    /// What moves the garments in the profile bake (without: anchored)
+    #[arg(long, value_enum)]
+    blend: Option<Way>,
     /// Move the garments by all blends, and show them side by side: variants.gif, variants.png, and their times in report.json
     #[arg(long)]
     compare: bool,
@@ -65,7 +65,7 @@ pub struct Animate {
 enum Time {
     /// Cloth as it moves, layers moved apart at full resolution
     Bake,
-    /// Three classes of cloth, layers kept in their order: some 20 times faster
+    /// Three classes of cloth, layers kept in their order: faster, and not without crossings
     Realtime,
 }
 
@@ -102,6 +102,10 @@ impl Animate {
     /// [`StudioError`] where a stage has no answer or files cannot be read or written.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         must_exist(&self.subject)?;
+        if matches!(self.profile, Time::Realtime) && (self.blend.is_some() || self.compare) {
+            let reason = "--profile realtime moves the garments in a way of its own: leave --blend and --compare away";
+            return Err(StudioError::Usage(reason.into()));
+        }
         let options = AnimateOptions {
             motion: motion_choice(self.motion.as_deref()),
             fps: self.fps,
@@ -110,10 +114,10 @@ impl Animate {
                 Time::Realtime => Profile::Realtime,
             },
             blend: match self.blend {
-                Way::Skinning => Blend::Skinning,
-                Way::Physics => Blend::Physics,
-                Way::Seed => Blend::Seed,
-                Way::Anchored => Blend::Anchored,
+                Some(Way::Skinning) => Blend::Skinning,
+                Some(Way::Physics) => Blend::Physics,
+                Some(Way::Seed) => Blend::Seed,
+                None | Some(Way::Anchored) => Blend::Anchored,
             },
             skinning: match self.skinning {
                 Weights::Linear => Skinning::Linear,
