@@ -1,5 +1,7 @@
 //! Bodies by measures: people of the model's own kind, and the soldiers of ANSUR II.
 
+#![allow(clippy::unwrap_used)] // all of it is test code
+
 use std::{path::Path, sync::LazyLock};
 
 use rayon::prelude::*;
@@ -75,7 +77,6 @@ fn a_person_keeps_what_was_not_asked_for() {
 
 #[test]
 fn what_nobody_has_is_refused_in_a_sentence_and_what_the_model_lacks_is_named() {
-    let model = &*MODEL;
     let [man, woman] = &*SEARCHES;
     for (values, says) in [
         (&[("stature", 3.1)][..], "nobody has a stature of 3.10 m"),
@@ -129,7 +130,6 @@ fn soldiers(path: &Path, is_woman: bool) -> Vec<Soldier> {
 #[test]
 fn a_hundred_soldiers_are_met() {
     let Some(folder) = toile_outside::data("ansur2") else { return };
-    let model = &*MODEL;
     let mut people = soldiers(&folder.join("ansur2_female.csv"), true);
     people.extend(soldiers(&folder.join("ansur2_male.csv"), false));
     let [man, woman] = &*SEARCHES;

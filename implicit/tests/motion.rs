@@ -1,5 +1,7 @@
 //! The surface in motion: closed at every level of detail, hardly crossing itself but in the creases of joints, near to the skinned body.
 
+#![allow(clippy::unwrap_used)] // all of it is test code
+
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use toile_animation::{Bvh, RetargetSettings, bvh, retarget, shipped_walk};

@@ -17,7 +17,8 @@ pub(super) fn bind(around: &Around, cloth: &Cloth, chains: &[SpringChain], layer
         let place = p.cast::<f64>();
         let depth = around.top - place.y;
         if depth <= 0.0 {
-            (out.joints.push(layer.weights.joints[v]), out.weights.push(layer.weights.weights[v]));
+            out.joints.push(layer.weights.joints[v]);
+            out.weights.push(layer.weights.weights[v]);
             continue;
         }
         let (turn, _) = around.polar(&place);

@@ -30,7 +30,7 @@ pub fn leg_outside(weights: &SkinWeights, body: &[Point3<f32>], garment: &Mesh, 
     let bvh = Bvh::new(worn, &garment.triangles);
     let outside = |p: &Point3<f32>| {
         let far = bvh.closest(p, 0.2).map_or(0.2, |hit| hit.distance);
-        if far > 1e-3 && crossings(&bvh, p) % 2 == 0 { f64::from(far) } else { 0.0 }
+        if far > 1e-3 && crossings(&bvh, p).is_multiple_of(2) { f64::from(far) } else { 0.0 }
     };
     let between = |p: &&Point3<f32>| p.y > highest + 0.005 && p.y < waist;
     (0..body.len()).filter(is_leg).map(|v| &body[v]).filter(between).map(outside).fold(0.0, f64::max)
