@@ -161,7 +161,14 @@ mod tests {
             let table = catalog.ask(query.sql, "0.2").unwrap();
             assert!(table.rows.is_empty() && !table.columns.is_empty(), "{}", query.name);
         }
-        assert!(catalog.ask("DELETE FROM subjects", "").unwrap_err().to_string().contains("readonly"));
+        let file = dir.path().join("other.sqlite");
+        let creating = [format!("ATTACH '{}' AS other", file.display()), format!("VACUUM INTO '{}'", file.display())];
+        for sql in creating.iter().map(String::as_str).chain(["DELETE FROM subjects"]) {
+            let said = catalog.ask(sql, "").unwrap_err().to_string();
+            assert!(said.contains("not read-only") && !file.exists(), "{said}");
+        }
+        let returning = "DELETE FROM subjects RETURNING subject";
+        assert!(catalog.ask(returning, "").unwrap_err().to_string().contains("readonly"));
         assert!(catalog.ask("SELECT nothing", "").is_err());
     }
 }

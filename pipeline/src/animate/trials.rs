@@ -147,7 +147,7 @@ fn what_another_run_left_is_not_used_and_that_is_said() {
     assert!(said[0].contains("of another motion") && report.frames.len() == 5, "{said:?}");
     bake_and_kill(folder.path(), 2);
     let (_, said) = bake(&avatar, &walk(7), Blend::Skinning, folder.path()).unwrap();
-    assert!(said[0].contains("another blend, skinning or fabric"), "{said:?}");
+    assert!(said[0].contains("another profile, blend, skinning or fabric"), "{said:?}");
     bake_and_kill(folder.path(), 2);
     fs::write(folder.path().join("01-skirt.pc2.part"), b"POINTCACHE2").unwrap();
     let (report, said) = bake(&avatar, &walk(7), Blend::Anchored, folder.path()).unwrap();
