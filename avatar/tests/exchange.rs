@@ -96,7 +96,7 @@ fn usd_itself_skins_every_layer_as_we_do() {
     let mut avatar = dressed();
     avatar.joint_names = JointNaming::Mixamo; // with colons, which names in USD cannot have
     let Some(found) = understood(&avatar, 5) else { return };
-    assert_eq!(found["issues"], Value::Array(Vec::new()), "USD's compliance checker");
+    assert_eq!(found["issues"], Value::Array(Vec::new()), "USD's validators");
     assert_eq!((&found["metres_per_unit"], &found["up"]), (&1.0.into(), &"Y".into()));
     assert_eq!((&found["rate"], &found["end"]), (&10.0.into(), &8.0.into()));
     let joints = found["joints"].as_array().unwrap();

@@ -3,19 +3,19 @@
 
     python3 tests/usd/check.py FILE TIME_CODE [EVERY]
 
-Printed are the issues of USD's compliance checker, units and up axis, the joints, and for each mesh its display colour of the first
+Printed are the issues that USD's validators find, units and up axis, the joints, and for each mesh its display colour of the first
 vertex, its counts, and every EVERY-th of its points as UsdSkel skins them at the time code.
 """
 import json
 import sys
 
-from pxr import Usd, UsdGeom, UsdSkel, UsdUtils, Vt
+from pxr import Usd, UsdGeom, UsdSkel, UsdValidation, Vt
 
 
-def issues(path):
-    checker = UsdUtils.ComplianceChecker(arkit=False, skipARKitRootLayerCheck=False)
-    checker.CheckCompliance(path)
-    return checker.GetErrors() + checker.GetFailedChecks() + checker.GetWarnings()
+def issues(stage):
+    """What USD's own validators, which `usdchecker` runs too, have to say."""
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    return [error.GetErrorAsString() for error in UsdValidation.ValidationContext(validators).Validate(stage)]
 
 
 def main():
@@ -44,7 +44,7 @@ def main():
             }
     json.dump(
         {
-            "issues": issues(path),
+            "issues": issues(stage),
             "metres_per_unit": UsdGeom.GetStageMetersPerUnit(stage),
             "up": UsdGeom.GetStageUpAxis(stage),
             "rate": stage.GetTimeCodesPerSecond(),
