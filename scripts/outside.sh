@@ -3,6 +3,7 @@
 # With TOILE_REQUIRE_OUTSIDE=1 the test fails instead, and so does this script.
 #   target/outside/node_modules/gltf-validator   Khronos' glTF validator (npm)
 #   target/outside/node_modules/@pixiv/three-vrm three.js, its VRM loader, and what drives Chromium (npm); Chromium is Debian's, as for the console
+#   target/outside/usd                           OpenUSD's library (PyPI: usd-core), which skins and checks USD files
 #   assimp                                       loads GLB (Debian's assimp-utils)
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -32,6 +33,12 @@ if [ ! -d target/outside/node_modules/@pixiv/three-vrm ]; then
     else
         missing three-vrm "it is installed with npm, which is missing too"
     fi
+fi
+
+if [ ! -d target/outside/usd/pxr ]; then
+    echo "outside: installing usd-core"
+    timeout 180 python3 -m pip install --quiet --no-deps --target target/outside/usd "usd-core==26.11" >target/outside/usd.log 2>&1 ||
+        missing usd-core "pip could not install it (target/outside/usd.log)"
 fi
 
 if ! command -v assimp >/dev/null; then

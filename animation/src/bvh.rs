@@ -9,6 +9,7 @@ mod frames;
 mod hierarchy;
 mod lines;
 mod model;
+mod of_motion;
 mod read;
 #[cfg(test)]
 mod tests;

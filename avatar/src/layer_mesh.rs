@@ -9,16 +9,18 @@ use crate::{
     buffer::{Buffer, Shape, Target},
 };
 
+/// The linear colour of a layer whose vertices have none.
+pub(crate) const NEUTRAL: [f64; 3] = [0.6, 0.6, 0.6];
+
 /// Appends the layer's arrays to `buffer`; returns the glTF mesh, which uses material `material`.
 pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buffer) -> Value {
     let mesh = &layer.mesh;
     let positions: Vec<f32> = mesh.positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
-    let normals = if mesh.normals.is_empty() { mesh.vertex_normals() } else { mesh.normals.clone() };
-    let normals: Vec<f32> = normals.iter().flat_map(unit).collect();
+    let normals = layer.normals();
     let (joints, weights) = influences(&layer.weights);
     let mut attributes = json!({
         "POSITION": buffer.add_bounded(&positions, Shape::Vec3, Target::Vertices),
-        "NORMAL": buffer.add(&normals, Shape::Vec3, Target::Vertices),
+        "NORMAL": buffer.add(normals.as_flattened(), Shape::Vec3, Target::Vertices),
         "JOINTS_0": buffer.add(&joints, Shape::Vec4, Target::Vertices),
         "WEIGHTS_0": buffer.add(&weights, Shape::Vec4, Target::Vertices),
     });
@@ -40,14 +42,22 @@ pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buff
     })
 }
 
+impl AvatarLayer {
+    /// The normal of every vertex, of unit length.
+    pub(crate) fn normals(&self) -> Vec<[f32; 3]> {
+        let mesh = &self.mesh;
+        let normals = if mesh.normals.is_empty() { mesh.vertex_normals() } else { mesh.normals.clone() };
+        normals.iter().map(unit).collect()
+    }
+}
+
 /// The material of a layer: matt, its colour from the vertices, both sides of cloth visible.
 pub(crate) fn material(layer: &AvatarLayer) -> Value {
-    const NEUTRAL: [f64; 4] = [0.6, 0.6, 0.6, 1.0];
-    let base = if layer.mesh.colors.is_empty() { NEUTRAL } else { [1.0; 4] };
+    let [r, g, b] = if layer.mesh.colors.is_empty() { NEUTRAL } else { [1.0; 3] };
     json!({
         "name": layer.name,
         "doubleSided": layer.order > 0,
-        "pbrMetallicRoughness": { "baseColorFactor": base, "metallicFactor": 0.0, "roughnessFactor": 1.0 },
+        "pbrMetallicRoughness": { "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0 },
     })
 }
 
@@ -91,14 +101,14 @@ fn linear_colors(colors: &[[u8; 3]]) -> Vec<u16> {
 }
 
 /// IEC 61966-2-1, decoding.
-fn linear_of_srgb(value: u8) -> f64 {
+pub(crate) fn linear_of_srgb(value: u8) -> f64 {
     let c = f64::from(value) / 255.0;
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Joints and weights, four a vertex. Weights are whole 65536ths and sum to 1 without rounding; unused slots are
 /// joint 0, weight 0; no joint comes twice.
-fn influences(weights: &SkinWeights) -> (Vec<u8>, Vec<f32>) {
+pub(crate) fn influences(weights: &SkinWeights) -> (Vec<u8>, Vec<f32>) {
     const WHOLE: u32 = 1 << 16;
     let (mut joints, mut out) = (Vec::with_capacity(4 * weights.len()), Vec::with_capacity(4 * weights.len()));
     for v in 0..weights.len() {

@@ -1,10 +1,12 @@
-//! The dressed character as files: binary glTF and VRM 1.0.
+//! The dressed character as files: binary glTF, VRM 1.0, USD, OBJ.
 //!
 //! - [`Avatar`]: skeleton, the pose that the layers are in, layers with their skin weights, motions;
 //! - [`write_glb`]: one mesh node a layer, one skin, one animation a motion; with a single layer, a rigged scan;
 //! - [`write_glb_with_helpers`]: the same with joints beside the skeleton's, which show one motion of layers that swing;
 //! - [`write_textured`]: one mesh with a texture, without bones;
-//! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named, and with springs where parts hang loose.
+//! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named, and with springs where parts hang loose;
+//! - [`write_usda`]: layers, skeleton and motions as USD text;
+//! - [`write_obj`], [`write_mtl`]: the layers at rest as OBJ.
 //!
 //! ```
 //! use nalgebra::Point3;
@@ -42,10 +44,12 @@ mod glb;
 mod helpers;
 mod layer_mesh;
 mod motion;
+mod obj;
 mod point_cache;
 mod rig;
 mod springs;
 mod textured;
+mod usda;
 mod vrm;
 
 pub use dressed::{Avatar, AvatarLayer};
@@ -53,6 +57,8 @@ pub use error::AvatarError;
 pub use glb::write_glb;
 pub use helpers::{HelperJoints, write_glb_with_helpers};
 pub use motion::{FileMotion, MotionJoint, read_motion};
+pub use obj::{write_mtl, write_obj};
 pub use point_cache::PointCache;
 pub use textured::{Picture, write_textured};
+pub use usda::write_usda;
 pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, vrm_pose, write_vrm};

@@ -14,6 +14,7 @@ use toile_garments::CullSettings;
 use crate::{
     PipelineError,
     folders::Folders,
+    formats::FileFormat,
     json, motion,
     options::{HiddenChoice, MotionChoice, Options, Springs},
 };
@@ -31,6 +32,9 @@ pub struct AvatarChoice {
     /// Whether loose parts swing in `avatar.vrm`; without, as the settings say.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub springs: Option<Springs>,
+    /// The formats that it is written in beside GLB and VRM.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub formats: Vec<FileFormat>,
 }
 
 impl AvatarChoice {
@@ -60,6 +64,9 @@ impl AvatarChoice {
             HiddenChoice::Whole => choice.hidden = None,
             HiddenChoice::LeftOut(settings) => choice.hidden = Some(settings.clone()),
         }
+        if let Some(asked) = &options.formats {
+            choice.formats = FileFormat::beside_usual(asked);
+        }
         choice.springs = options.springs.or(choice.springs);
         choice.joint_names = options.joint_names.unwrap_or(choice.joint_names);
         if choice != before {
@@ -86,7 +93,11 @@ impl AvatarChoice {
             (!is_vrm).then(|| "joint names of another system (--joint-names vrm for the usual ones)".to_string());
         let springs = (self.springs == Some(Springs::Off))
             .then(|| "nothing that swings in avatar.vrm (--springs on for springs)".to_string());
-        [motion, hidden, names, springs].into_iter().flatten().collect()
+        let formats = (!self.formats.is_empty()).then(|| {
+            let names: Vec<&str> = self.formats.iter().map(|f| f.name()).collect();
+            format!("files as {} (`toile export --to glb,vrm` for the usual ones alone)", names.join(", "))
+        });
+        [motion, hidden, names, springs, formats].into_iter().flatten().collect()
     }
 }
 
@@ -153,9 +164,14 @@ mod tests {
         let chosen = with(Options { motion: MotionChoice::File(bvh), hidden, ..Options::default() });
         assert_eq!(fs::read_to_string(chosen.motion_path(&folders).unwrap()).unwrap(), "HIERARCHY");
         assert_eq!(with(Options::default()), chosen);
+        assert!(!fs::read_to_string(folders.avatar_choice()).unwrap().contains("formats"), "as files were before");
         assert_eq!(chosen.in_words().len(), 2);
         let walks = with(Options { motion: MotionChoice::Walk, ..Options::default() });
         assert_eq!((walks.motion, walks.hidden), (None, chosen.hidden));
+        use FileFormat::{Glb, Obj, Usda};
+        let files = with(Options { formats: Some(vec![Usda, Glb, Obj, Usda]), ..Options::default() });
+        assert_eq!((&files.formats, with(Options::default()).formats), (&vec![Obj, Usda], vec![Obj, Usda]));
+        assert!(with(Options { formats: Some(vec![Glb]), ..Options::default() }).formats.is_empty());
         with(Options { hidden: HiddenChoice::Whole, ..Options::default() });
         assert_eq!(AvatarChoice::read(&folders).unwrap(), AvatarChoice::default());
     }

@@ -153,6 +153,16 @@ impl Folders {
         self.root.join("avatar.vrm")
     }
 
+    /// The avatar in another format, such as `obj`.
+    pub fn avatar_as(&self, extension: &str) -> PathBuf {
+        self.root.join(format!("avatar.{extension}"))
+    }
+
+    /// A layer of the avatar, alone.
+    pub fn avatar_layer(&self, layer: &str) -> PathBuf {
+        self.root.join(format!("avatar-{layer}.ply"))
+    }
+
     /// The page for the operator.
     pub fn report(&self) -> PathBuf {
         self.root.join("report.html")

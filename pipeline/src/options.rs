@@ -7,7 +7,7 @@ use toile_character::JointNaming;
 use toile_fusion::FusionSettings;
 use toile_garments::CullSettings;
 
-use crate::{PipelineError, motion};
+use crate::{PipelineError, formats::FileFormat, motion};
 
 /// How far to go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -35,6 +35,8 @@ pub struct Options {
     pub hidden: HiddenChoice,
     /// Whether loose parts swing in `avatar.vrm`; without, as before.
     pub springs: Option<Springs>,
+    /// The formats that the avatar is written in beside GLB and VRM; without, as before.
+    pub formats: Option<Vec<FileFormat>>,
     /// Stop after this layer; without, all of them.
     pub last_layer: Option<String>,
     /// A file of settings beside the subject's own `toile.toml`.

@@ -9,13 +9,21 @@ use crate::{
     Observer, PipelineError, Run, Settings,
     avatar_choice::AvatarChoice,
     body_file::Body,
+    exchange,
     garment::{self, Garment},
     json,
     options::{Goal, MotionChoice, Options},
-    settings, stale,
+    record, settings, stale,
     step::Step,
     steps::{
-        cut::Cut, export::Export, fit::Fit, fuse::Fuse, page::Page, pose::PoseUnder, read_scan::ReadScan, stack::Stack,
+        cut::Cut,
+        export::{Export, Exported},
+        fit::Fit,
+        fuse::Fuse,
+        page::Page,
+        pose::PoseUnder,
+        read_scan::ReadScan,
+        stack::Stack,
         texture::Texturing,
     },
     summary::{Measured, Summary, TakeSummary},
@@ -150,9 +158,13 @@ fn deliver(
     if choice == before {
         summary.notes.extend(choice.in_words().into_iter().map(|what| format!("the avatar keeps {what}")));
     }
-    let exported = summary.hear(run.step(&Export { run, body, garments, choice: &choice })?);
-    summary.decided.avatar = Some(exported);
-    summary.files = vec![folders.glb(), folders.vrm()];
+    let export = Export { run, body, garments, choice: &choice };
+    let earlier = record::read::<Exported>(&export.folder(), Export::NAME).ok().flatten();
+    let record = run.step(&export)?;
+    let written = earlier.map_or_else(Default::default, |earlier| earlier.outputs);
+    exchange::left_over(&folders.root, &written, &record.outputs).iter().try_for_each(|path| remove(path))?;
+    summary.decided.avatar = Some(summary.hear(record));
+    summary.files = export.outputs();
     if goal == Goal::Report {
         run.step(&Page { run, body, garments, choice: &choice, summary })?;
         summary.files.push(folders.report());

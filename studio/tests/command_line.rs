@@ -103,6 +103,14 @@ fn a_margin_needs_culling_and_is_a_length() {
 }
 
 #[test]
+fn formats_that_there_are_not_are_named_with_those_there_are() {
+    let subject = tempfile::tempdir().unwrap();
+    let answer = exits(2, toile().arg("export").arg(subject.path()).args(["--to", "glb,fbx"]));
+    let message = answer["error"]["message"].as_str().unwrap();
+    assert!(message.contains("fbx") && message.contains("glb, vrm, obj, ply, bvh, usda"), "{message}");
+}
+
+#[test]
 fn a_thickness_that_no_cloth_has_is_said_before_any_work() {
     let recording = common::Recording::new(3, 3);
     exits(0, toile().args(recording.import("body")));

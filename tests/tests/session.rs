@@ -231,6 +231,46 @@ fn hidden_skin_is_left_out_on_request_and_comes_back() {
 }
 
 #[test]
+fn further_formats_are_written_remembered_and_removed() {
+    let (dir, subject) = copied(demo());
+    let run = |words: &[&str]| {
+        let output = toile(&[words, &[subject.to_str().unwrap(), "--json"]].concat()).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let usual = ["avatar.glb", "avatar.vrm"].map(|name| fs::read(subject.join(name)).unwrap());
+    run(&["export", "--to", "obj,ply,bvh,usda"]);
+    assert!(["avatar.glb", "avatar.vrm"].map(|name| fs::read(subject.join(name)).unwrap()) == usual);
+    let all = toile_geometry::obj::read(&subject.join("avatar.obj")).unwrap();
+    let layers: Vec<PathBuf> = fs::read_dir(&subject)
+        .unwrap()
+        .flatten()
+        .map(|e| e.path())
+        .filter(|path| path.extension().is_some_and(|e| e == "ply"))
+        .collect();
+    assert_eq!(layers.len(), fs::read_dir(subject.join("takes")).unwrap().count());
+    let layers: Vec<_> = layers.iter().map(|path| ply::read(path).unwrap()).collect();
+    assert_eq!(layers.iter().map(|l| l.positions.len()).sum::<usize>(), all.positions.len());
+    assert!(layers.iter().all(|l| l.attributes["weight0"].len() == l.positions.len()));
+    let (low, high) = all.bounds().unwrap();
+    assert!(low.y > -0.1 && high.y > 1.3 && high.y < 2.2, "metres, +Y up, on the floor: {low} {high}");
+    let usda = fs::read_to_string(subject.join("avatar.usda")).unwrap();
+    assert_eq!(usda.matches("def Mesh").count(), layers.len());
+    // Nothing of it stays that a later run does not want, but for what somebody changed.
+    fs::write(subject.join("avatar.mtl"), "mine").unwrap();
+    let bvh = dir.path().join("again.bvh");
+    fs::copy(subject.join("avatar.bvh"), &bvh).unwrap();
+    let told = run(&["process"]);
+    assert!(told["warnings"].to_string().contains("obj, ply, bvh, usda"), "{told}");
+    assert_ne!(fs::read(subject.join("avatar.mtl")).unwrap(), b"mine", "made anew");
+    fs::write(subject.join("avatar.mtl"), "mine").unwrap();
+    run(&["export", "--to", "glb", "--motion", bvh.to_str().unwrap()]);
+    let is_there = |name: &str| subject.join(name).exists();
+    assert!(!["avatar.obj", "avatar.bvh", "avatar.usda", "avatar-body.ply"].iter().any(|name| is_there(name)));
+    assert!(is_there("avatar.mtl") && is_there("avatar.vrm"));
+}
+
+#[test]
 fn khronos_validator_finds_nothing() {
     let subject = demo();
     let modules = workspace().join("target/outside/node_modules");

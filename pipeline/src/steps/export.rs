@@ -1,7 +1,7 @@
 //! Step `export`: the dressed avatar as files, looked at in the poses that it will be seen in.
 //!
 //! Reads the body, every garment with its weights, and the motion. Writes `avatar.glb` and `avatar.vrm`, on request
-//! without what clothes hide.
+//! without what clothes hide, and in further formats.
 
 use std::{
     collections::BTreeMap,
@@ -23,6 +23,7 @@ use crate::{
     PipelineError, Run,
     avatar_choice::AvatarChoice,
     body_file::Body,
+    exchange,
     garment::Garment,
     json, look,
     look::Look,
@@ -31,6 +32,9 @@ use crate::{
     options::Springs,
     step::{Product, Step},
 };
+
+/// Name of the body's layer.
+const BODY: &str = "body";
 
 /// Writing the avatar's files.
 pub struct Export<'a> {
@@ -89,6 +93,11 @@ impl Export<'_> {
         self.choice.springs.unwrap_or(self.run.settings.avatar.springs) == Springs::On
     }
 
+    /// Names of the layers, whether or not something of them is left.
+    fn layer_names(&self) -> impl Iterator<Item = &str> + Clone {
+        std::iter::once(BODY).chain(self.garments.iter().map(|g| g.name.as_str()))
+    }
+
     /// The avatar as its files have it: in scan 0's pose, without what is left out.
     ///
     /// # Errors
@@ -113,7 +122,7 @@ impl Export<'_> {
     /// The avatar at rest in scan 0's pose: the body and every garment.
     pub(crate) fn dressed(&self) -> Result<Avatar, PipelineError> {
         let (folders, body) = (&self.run.folders, &self.body.skinned);
-        let (name, weights) = ("body".to_string(), body.weights.clone());
+        let (name, weights) = (BODY.to_string(), body.weights.clone());
         let mesh = read_mesh(&folders.body_mesh())?;
         let mut layers = vec![AvatarLayer { name, mesh, weights, order: 0, garment: None, thickness: None }];
         for garment in self.garments {
@@ -166,7 +175,10 @@ impl Step for Export<'_> {
     }
 
     fn outputs(&self) -> Vec<PathBuf> {
-        vec![self.run.folders.glb(), self.run.folders.vrm()]
+        let (folders, formats) = (&self.run.folders, &self.choice.formats);
+        let mut files = vec![folders.glb(), folders.vrm()];
+        files.extend(exchange::paths(folders, formats, self.layer_names()));
+        files
     }
 
     fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<Exported>, PipelineError> {
@@ -189,7 +201,8 @@ impl Step for Export<'_> {
         progress(0.75);
         let springs = if self.has_springs() { spring_bones(&avatar).map_err(wrong)? } else { None };
         let vrm = write_vrm(&avatar, &VrmMeta::default(), springs.as_ref()).map_err(wrong)?;
-        let files = self.outputs().into_iter().zip([glb, vrm]).collect();
+        let others = exchange::contents(&avatar, &self.choice.formats, self.layer_names()).map_err(wrong)?;
+        let files = self.outputs().into_iter().zip([glb, vrm].into_iter().chain(others)).collect();
         let of_motion = moved.report.warnings.iter().map(|w| format!("motion {}: {w}", look.motion));
         let warnings = of_motion.chain(look.warnings()).collect();
         let springs = springs.map(|s| Hung::of(&s, &avatar));

@@ -10,7 +10,7 @@ use toile_capture::{
 };
 use toile_character::JointNaming;
 use toile_garments::CullSettings;
-use toile_pipeline::{Goal, HiddenChoice, Options};
+use toile_pipeline::{FileFormat, Goal, HiddenChoice, Options};
 
 use crate::{
     StudioError,
@@ -34,12 +34,16 @@ smaller, and nothing can poke through where nothing is; export again without it 
 Where a skirt, dress or coat hangs loose around the legs, avatar.vrm has chains of spring bones (VRMC_springBone) on which it
 swings in other programs; --springs off leaves them out.
 
-Motion, joint names, springs and hidden triangles that are left out are remembered in SUBJECT/edits/: later runs make the same avatar.
+--to writes further files beside them, all in metres with +Y up: avatar.obj with avatar.mtl and avatar-LAYER.ply (the layers in the
+pose of the first scan), avatar.bvh (the motion), avatar.usda (everything). Those that a later --to does not name are removed.
+
+Motion, joint names, springs, formats and hidden triangles that are left out are remembered in SUBJECT/edits/: later runs make the same avatar.
 
 Examples:
   toile export anna --motion dance.bvh
   toile export anna --glb anna-today.glb
   toile export anna --cull-hidden --cull-margin 50
+  toile export anna --to glb,vrm,obj,bvh,usda
   toile export anna --joint-names mixamo --glb for-unity.glb
   toile export anna/takes/00-body.mcap --mcap plain.mcap";
 
@@ -56,6 +60,10 @@ pub struct Export {
     /// programs map by themselves (without: as the avatar was made last; vrm the first time)
     #[arg(long, value_enum)]
     joint_names: Option<Names>,
+    /// The formats of the avatar's files, with commas between; GLB and VRM are always written (without: as the avatar was made
+    /// last; glb,vrm the first time)
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "FORMAT")]
+    to: Option<Vec<Format>>,
     /// Put a copy of the GLB here
     #[arg(long, value_name = "FILE")]
     glb: Option<PathBuf>,
@@ -75,7 +83,7 @@ pub struct Export {
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Convert a recording: depth as plain 16-bit images (16UC1), which other viewers display
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "joint_names", "glb", "vrm", "cull_hidden", "springs"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "joint_names", "glb", "vrm", "cull_hidden", "springs", "to"])]
     mcap: Option<PathBuf>,
 }
 
@@ -93,6 +101,36 @@ impl From<Names> for JointNaming {
             Names::Vrm => Self::Vrm,
             Names::Hanim => Self::HAnim,
             Names::Mixamo => Self::Mixamo,
+        }
+    }
+}
+
+/// A format on the command line.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Format {
+    /// Everything: layers, skeleton, motion
+    Glb,
+    /// The same in T-pose, with spring bones
+    Vrm,
+    /// avatar.obj and avatar.mtl: the layers in the pose of the first scan
+    Obj,
+    /// avatar-LAYER.ply: each layer alone, with its skin weights
+    Ply,
+    /// avatar.bvh: the motion on the avatar's skeleton
+    Bvh,
+    /// avatar.usda: layers, skeleton and motion as USD text
+    Usda,
+}
+
+impl From<Format> for FileFormat {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::Glb => Self::Glb,
+            Format::Vrm => Self::Vrm,
+            Format::Obj => Self::Obj,
+            Format::Ply => Self::Ply,
+            Format::Bvh => Self::Bvh,
+            Format::Usda => Self::Usda,
         }
     }
 }
@@ -122,6 +160,7 @@ impl Export {
             joint_names: self.joint_names.map(Into::into),
             hidden: self.hidden()?,
             springs: self.springs.map(Into::into),
+            formats: self.to.as_ref().map(|to| to.iter().copied().map(Into::into).collect()),
             settings: self.settings.clone(),
             ..Options::default()
         };
