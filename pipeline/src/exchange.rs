@@ -15,15 +15,11 @@ use crate::{folders::Folders, formats::FileFormat, hash, meshes::encode_skinned}
 const MATERIALS: &str = "avatar.mtl";
 
 /// The files of `formats` for an avatar with these `layers`.
-pub(crate) fn paths<'a>(
-    folders: &Folders,
-    formats: &[FileFormat],
-    layers: impl Iterator<Item = &'a str> + Clone,
-) -> Vec<PathBuf> {
+pub(crate) fn paths(folders: &Folders, formats: &[FileFormat], layers: &[&str]) -> Vec<PathBuf> {
     let of_format = |format: &FileFormat| match format {
         FileFormat::Glb | FileFormat::Vrm => Vec::new(),
         FileFormat::Obj => vec![folders.avatar_as("obj"), folders.root.join(MATERIALS)],
-        FileFormat::Ply => layers.clone().map(|layer| folders.avatar_layer(layer)).collect(),
+        FileFormat::Ply => layers.iter().map(|layer| folders.avatar_layer(layer)).collect(),
         FileFormat::Bvh | FileFormat::Usda => vec![folders.avatar_as(format.name())],
     };
     formats.iter().flat_map(of_format).collect()
@@ -33,11 +29,7 @@ pub(crate) fn paths<'a>(
 ///
 /// # Errors
 /// [`AvatarError`] where the avatar breaks a rule.
-pub(crate) fn contents<'a>(
-    avatar: &Avatar,
-    formats: &[FileFormat],
-    layers: impl Iterator<Item = &'a str> + Clone,
-) -> Result<Vec<Vec<u8>>, AvatarError> {
+pub(crate) fn contents(avatar: &Avatar, formats: &[FileFormat], layers: &[&str]) -> Result<Vec<Vec<u8>>, AvatarError> {
     let mut files = Vec::new();
     for format in formats {
         match format {
@@ -45,7 +37,7 @@ pub(crate) fn contents<'a>(
             FileFormat::Obj => {
                 files.extend([write_obj(avatar, MATERIALS)?, write_mtl(avatar)].map(String::into_bytes));
             }
-            FileFormat::Ply => files.extend(layers.clone().map(|name| alone(avatar, name))),
+            FileFormat::Ply => files.extend(layers.iter().map(|name| alone(avatar, name))),
             FileFormat::Bvh => files.push(motion(avatar)?),
             FileFormat::Usda => files.push(write_usda(avatar)?.into_bytes()),
         }

@@ -80,7 +80,7 @@ mod tests {
         let motion = Motion { name: "turns".into(), frame_time: 0.04, poses: vec![pose(0.2), pose(1.3)] };
         for naming in JointNaming::ALL {
             let text = bvh::write(&Bvh::of_motion(&skeleton, &motion, naming));
-            let read = bvh::parse(&text).unwrap();
+            let read = bvh::parse(&text, "turns").unwrap();
             assert_eq!((read.joints.len(), read.frames.len(), read.frame_time), (JOINT_COUNT, 2, 0.04));
             assert_eq!(read.joints.iter().filter(|j| j.end_site.is_some()).count(), 13);
             for (frame, pose) in motion.poses.iter().enumerate() {

@@ -94,8 +94,8 @@ impl Export<'_> {
     }
 
     /// Names of the layers, whether or not something of them is left.
-    fn layer_names(&self) -> impl Iterator<Item = &str> + Clone {
-        std::iter::once(BODY).chain(self.garments.iter().map(|g| g.name.as_str()))
+    fn layer_names(&self) -> Vec<&str> {
+        std::iter::once(BODY).chain(self.garments.iter().map(|g| g.name.as_str())).collect()
     }
 
     /// The avatar as its files have it: in scan 0's pose, without what is left out.
@@ -177,7 +177,7 @@ impl Step for Export<'_> {
     fn outputs(&self) -> Vec<PathBuf> {
         let (folders, formats) = (&self.run.folders, &self.choice.formats);
         let mut files = vec![folders.glb(), folders.vrm()];
-        files.extend(exchange::paths(folders, formats, self.layer_names()));
+        files.extend(exchange::paths(folders, formats, &self.layer_names()));
         files
     }
 
@@ -201,7 +201,7 @@ impl Step for Export<'_> {
         progress(0.75);
         let springs = if self.has_springs() { spring_bones(&avatar).map_err(wrong)? } else { None };
         let vrm = write_vrm(&avatar, &VrmMeta::default(), springs.as_ref()).map_err(wrong)?;
-        let others = exchange::contents(&avatar, &self.choice.formats, self.layer_names()).map_err(wrong)?;
+        let others = exchange::contents(&avatar, &self.choice.formats, &self.layer_names()).map_err(wrong)?;
         let files = self.outputs().into_iter().zip([glb, vrm].into_iter().chain(others)).collect();
         let of_motion = moved.report.warnings.iter().map(|w| format!("motion {}: {w}", look.motion));
         let warnings = of_motion.chain(look.warnings()).collect();
