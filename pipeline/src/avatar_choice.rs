@@ -154,6 +154,7 @@ mod tests {
 
     #[test]
     fn a_choice_is_kept_until_another_one_is_made() {
+        use FileFormat::{Glb, Obj, Usda};
         let dir = tempfile::tempdir().unwrap();
         let (folders, bvh) = (Folders::new(&dir.path().join("anna")), dir.path().join("dance.bvh"));
         fs::write(&bvh, "HIERARCHY").unwrap();
@@ -168,7 +169,6 @@ mod tests {
         assert_eq!(chosen.in_words().len(), 2);
         let walks = with(Options { motion: MotionChoice::Walk, ..Options::default() });
         assert_eq!((walks.motion, walks.hidden), (None, chosen.hidden));
-        use FileFormat::{Glb, Obj, Usda};
         let files = with(Options { formats: Some(vec![Usda, Glb, Obj, Usda]), ..Options::default() });
         assert_eq!((&files.formats, with(Options::default()).formats), (&vec![Obj, Usda], vec![Obj, Usda]));
         assert!(with(Options { formats: Some(vec![Glb]), ..Options::default() }).formats.is_empty());
