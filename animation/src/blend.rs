@@ -25,7 +25,7 @@ mod room;
 mod shares;
 pub(crate) mod squeeze;
 mod state;
-mod strain;
+pub(crate) mod strain;
 mod wearer;
 
 pub(crate) use anchors::{Closeness, frequency};

@@ -24,7 +24,7 @@ pub struct Outfit {
     pub(crate) proxies: Vec<Proxy>,
     pub(crate) columns: Columns,
     /// One for each layer.
-    pub(super) limits: Vec<StrainLimit>,
+    pub(crate) limits: Vec<StrainLimit>,
 }
 
 impl Outfit {

@@ -17,14 +17,27 @@ pub(crate) const CLOTH: f32 = 1.2;
 pub(crate) const SKIN: f32 = 2.0;
 /// Triangles lower than this tell nothing about a stretch, metres: less than the noise of the sensors.
 const SLIVER: f32 = 1e-4;
-/// Rounds at most. What is too long then stays so for the frame.
-const ROUNDS: usize = 60;
+/// Rounds at most where time does not matter.
+pub(crate) const ROUNDS: usize = 60;
+/// Triangles in a parallel chunk.
+const CHUNK: usize = 512;
 
 /// The triangles of a layer and their shapes at rest.
 pub(crate) struct StrainLimit {
     limit: f32,
     triangles: Vec<Element>,
     of_vertex: VertexTriangles,
+}
+
+/// The triangles of a layer that are too long, used again from frame to frame.
+pub(crate) struct Torn {
+    /// Rounds at most. What is too long then stays so for the frame.
+    rounds: usize,
+    /// Ascending.
+    long: Vec<u32>,
+    next: Vec<u32>,
+    /// True for those that are in `next`.
+    waits: Vec<bool>,
 }
 
 /// A triangle at rest: two edges in its plane, metres, and the inverse of the matrix that has them as columns.
@@ -42,27 +55,38 @@ impl StrainLimit {
     }
 
     /// Shrinks the triangles that stretch too far where the layer lies at `positions`. Vertices with `normals` only slide across them.
-    pub fn apply(&self, positions: &mut [Point3<f32>], normals: Option<&[Vector3<f32>]>) {
-        let all = 0..self.triangles.len() as u32;
-        let too_far = |t: &u32, at: &[Point3<f32>]| self.triangles[*t as usize].excess(at, self.limit).is_some();
-        let mut long: Vec<u32> = all.into_par_iter().filter(|t| too_far(t, positions)).collect();
-        let mut waits = vec![false; self.triangles.len()];
-        for _ in 0..ROUNDS {
+    pub fn apply(&self, positions: &mut [Point3<f32>], normals: Option<&[Vector3<f32>]>, torn: &mut Torn) {
+        let Torn { rounds, long, next, waits } = torn;
+        let too_far = |t: usize, at: &[Point3<f32>]| self.triangles[t].excess(at, self.limit).is_some();
+        let at = &*positions;
+        waits.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(t, far)| *far = too_far(t, at));
+        long.clear();
+        long.extend((0..).zip(&*waits).filter(|(_, far)| **far).map(|(t, _): (u32, _)| t));
+        waits.fill(false);
+        for _ in 0..*rounds {
             if long.is_empty() {
                 return;
             }
-            let mut next = Vec::new();
-            for &t in &long {
+            next.clear();
+            for &t in &*long {
                 let triangle = &self.triangles[t as usize];
                 triangle.shrink(positions, normals, self.limit);
                 let touched = triangle.corners.iter().flat_map(|&v| self.of_vertex.of(v as usize));
                 next.extend(touched.filter(|&&n| !std::mem::replace(&mut waits[n as usize], true)));
             }
             next.iter().for_each(|&t| waits[t as usize] = false);
-            next.retain(|t| too_far(t, positions));
+            next.retain(|&t| too_far(t as usize, positions));
             next.sort_unstable();
-            long = next;
+            std::mem::swap(long, next);
         }
+    }
+}
+
+impl Torn {
+    /// Space for the triangles of a layer, which are shrunk in at most so many `rounds`.
+    pub fn new(triangles: usize, rounds: usize) -> Self {
+        let space = || Vec::with_capacity(triangles);
+        Self { rounds, long: space(), next: space(), waits: vec![false; triangles] }
     }
 }
 
@@ -138,14 +162,14 @@ mod tests {
         torn[6 * 12 + 6].y += 0.005;
         assert!(most(&limit, &torn) > 1.9);
         let mut eased = torn.clone();
-        limit.apply(&mut eased, None);
+        limit.apply(&mut eased, None, &mut Torn::new(mesh.triangles.len(), ROUNDS));
         assert!(most(&limit, &eased) < CLOTH + 1e-3, "{}", most(&limit, &eased));
         let middle = |at: &[Point3<f32>]| at.iter().map(|p| p.coords).sum::<Vector3<f32>>() / at.len() as f32;
         assert!((middle(&eased) - middle(&torn)).norm() < 1e-6);
         let still = mesh.positions.iter().zip(&eased).filter(|(a, b)| a == b).count();
         assert!(still > 60, "{still} of 144 vertices stay");
         let mut unharmed = mesh.positions.clone();
-        limit.apply(&mut unharmed, None);
+        limit.apply(&mut unharmed, None, &mut Torn::new(mesh.triangles.len(), ROUNDS));
         assert_eq!(unharmed, mesh.positions);
     }
 
@@ -157,7 +181,7 @@ mod tests {
         drawn[6 * 12 + 5].x -= 0.003;
         drawn[6 * 12 + 6].x += 0.003;
         let up = vec![Vector3::y(); drawn.len()];
-        limit.apply(&mut drawn, Some(&up));
+        limit.apply(&mut drawn, Some(&up), &mut Torn::new(mesh.triangles.len(), ROUNDS));
         assert!(most(&limit, &drawn) < CLOTH + 1e-3, "{}", most(&limit, &drawn));
         assert!(drawn.iter().all(|p| p.y == 0.0));
     }

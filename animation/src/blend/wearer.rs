@@ -5,7 +5,13 @@ use rayon::prelude::*;
 use toile_character::{Pose, PosedSkin, Skinning};
 use toile_cloth::{Effort, MovingSurface, Obstacle, Sheet, Surroundings, obstacle::Plane};
 
-use super::{Blend, outfit::Outfit, proxy::Proxy, squeeze::Pressed};
+use super::{
+    Blend,
+    outfit::Outfit,
+    proxy::Proxy,
+    squeeze::Pressed,
+    strain::{ROUNDS, Torn},
+};
 use crate::AnimationError;
 
 /// Farthest that a joint moves in one step of the simulation, metres, where that needs no more steps than are taken: the reach of contact
@@ -45,6 +51,8 @@ pub struct Wearer<'a> {
     pub(super) pressed: Option<Pressed>,
     /// Where the vertices of each garment were moved to beside where cloth and skin take them, in their local frames.
     pub(super) corrections: Vec<Vec<Vector3<f32>>>,
+    /// One for each layer.
+    torn: Vec<Torn>,
     skins: Vec<PosedSkin>,
     proxy_skins: Vec<PosedSkin>,
     layers: Vec<Vec<Point3<f32>>>,
@@ -63,6 +71,7 @@ impl<'a> Wearer<'a> {
             body: MovingSurface::new(&layers[0], &outfit.layers[0].mesh.triangles),
             surfaces: sheets.iter().map(|s| MovingSurface::new(&points(&s.positions), s.triangles())).collect(),
             pressed: None,
+            torn: outfit.layers.iter().map(|l| Torn::new(l.mesh.triangles.len(), ROUNDS)).collect(),
             corrections: layers[1..].iter().map(|l| vec![Vector3::zeros(); l.len()]).collect(),
             skins: layers.iter().map(|_| PosedSkin::with_frames()).collect(),
             proxy_skins: outfit.proxies.iter().map(|_| PosedSkin::with_frames()).collect(),
@@ -158,7 +167,7 @@ impl<'a> Wearer<'a> {
         let skin = self.layers[0].clone();
         let pressed = self.pressed.take().unwrap_or_else(|| outfit.columns.press(&skin));
         pressed.apply_to_body(&mut self.layers[0]);
-        outfit.limits[0].apply(&mut self.layers[0], Some(&pressed.normals));
+        outfit.limits[0].apply(&mut self.layers[0], Some(&pressed.normals), &mut self.torn[0]);
         for (k, proxy) in outfit.proxies.iter().enumerate() {
             let moved = self.moved_beside_skin(k);
             let fine = &mut self.layers[k + 1];
@@ -171,7 +180,7 @@ impl<'a> Wearer<'a> {
                 *c *= kept;
                 *p += turn * *c;
             });
-            outfit.limits[k + 1].apply(fine, None);
+            outfit.limits[k + 1].apply(fine, None, &mut self.torn[k + 1]);
         }
         self.pressed = Some(pressed);
     }

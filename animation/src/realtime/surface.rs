@@ -1,7 +1,7 @@
 //! The foot of a point on a surface that moves, found by walking from where it was.
 
 use nalgebra::{Point3, Vector3};
-use toile_geometry::topology::Edges;
+use toile_geometry::topology::{Edges, VertexTriangles};
 
 /// No triangle.
 pub(super) const NONE: u32 = u32::MAX;
@@ -13,6 +13,7 @@ pub(super) struct Surface {
     pub triangles: Vec<[u32; 3]>,
     /// The triangle across the edge opposite to each corner; [`NONE`] at a rim.
     across: Vec<[u32; 3]>,
+    of_vertex: VertexTriangles,
 }
 
 /// Where a point stands over a surface.
@@ -25,7 +26,8 @@ pub(super) struct Foot {
 }
 
 impl Surface {
-    pub fn new(triangles: &[[u32; 3]]) -> Self {
+    /// Of a mesh with so many `vertices`.
+    pub fn new(triangles: &[[u32; 3]], vertices: usize) -> Self {
         let edges = Edges::new(triangles);
         let beside = edges.triangles();
         let other = |t: usize, side: usize| {
@@ -34,7 +36,17 @@ impl Surface {
         };
         // Side k of a triangle joins corners k and k + 1: it is opposite to corner k + 2.
         let across = (0..triangles.len()).map(|t| [other(t, 1), other(t, 2), other(t, 0)]).collect();
-        Self { triangles: triangles.to_vec(), across }
+        Self { triangles: triangles.to_vec(), across, of_vertex: VertexTriangles::new(vertices, triangles) }
+    }
+
+    /// Unit normal of vertex `v` of those at `places`, weighted by area; zero where its triangles have none.
+    pub fn vertex_normal(&self, places: &[Point3<f32>], v: usize) -> Vector3<f32> {
+        let area = |t: &u32| {
+            let [a, b, c] = self.triangles[*t as usize].map(|v| places[v as usize]);
+            (b - a).cross(&(c - a))
+        };
+        let sum: Vector3<f32> = self.of_vertex.of(v).iter().map(area).sum();
+        sum.try_normalize(1e-12).unwrap_or_default()
     }
 
     /// The foot of `p` on the surface whose vertices are at `places`, walking from the triangle `seed`, which becomes where the walk
