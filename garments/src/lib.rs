@@ -15,7 +15,7 @@
 //! [`carry_weights`] gives layers that lie close over one another like weights, and none that a stride tears. `worn` examines
 //! the result: [`posed_report`] poses the layers, [`hidden_triangles`] finds triangles that are never in sight.
 //!
-//! [`follow()`] takes all of them along where the body's shape is changed.
+//! [`follow()`] takes all of them along where the body's shape is changed; [`wear()`] brings a garment of one person onto another.
 //!
 //! The seed's own way stays selectable: [`Labelling::NearestBodyVertex`] and [`StackMethod::PushAlongNormal`].
 //!
@@ -39,6 +39,7 @@ mod settings;
 mod skin;
 mod stack;
 mod take;
+mod wear;
 mod worn;
 
 pub use edits::{
@@ -64,6 +65,7 @@ pub use stack::{
 };
 pub use take::DressedTake;
 pub use toile_character::{FREE_PART, GarmentType};
+pub use wear::{Person, wear};
 pub use worn::{
     hidden::hidden_triangles,
     posed::{PosedReport, TORN, Worn, posed_report},

@@ -103,6 +103,21 @@ impl Folders {
         self.layer(layer).join("garment.ply")
     }
 
+    /// Everything that is worn without having been scanned.
+    pub fn all_worn(&self) -> PathBuf {
+        self.root.join("worn")
+    }
+
+    /// One garment of those.
+    pub fn worn(&self, label: &str) -> PathBuf {
+        self.all_worn().join(label)
+    }
+
+    /// What is noted about it.
+    pub fn worn_json(&self, label: &str) -> PathBuf {
+        self.worn(label).join("worn.json")
+    }
+
     /// The fitted body.
     pub fn body(&self) -> PathBuf {
         self.build().join("body")

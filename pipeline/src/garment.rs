@@ -3,10 +3,10 @@
 use serde::Serialize;
 use toile_garments::{ExtractionReport, GarmentType, cloth_thickness};
 
-use crate::{PipelineError, Record, Run, record, step::Step, steps::cut::Cut};
+use crate::{PipelineError, Record, Run, record, step::Step, steps::cut::Cut, worn};
 
 /// No cloth is taken for thicker, millimetres: stacking looks twice as far for the layers below.
-const THICKEST_MM: f32 = 10.0;
+pub const THICKEST_MM: f32 = 10.0;
 
 /// Folder name of a first take that was imported as the body, and the name of the clothes that it turned out to show.
 const BODY_TAKE: &str = "00-body";
@@ -15,8 +15,8 @@ const CLOTHES: &str = "00-clothes";
 /// A garment of the avatar.
 #[derive(Debug, Clone, Serialize)]
 pub struct Garment {
-    /// Number of the take that added it.
-    pub number: usize,
+    /// Number of the take that added it; none where it was put on from elsewhere.
+    pub number: Option<usize>,
     /// Its type: as `subject.toml` says, else guessed.
     #[serde(serialize_with = "as_text")]
     pub garment_type: GarmentType,
@@ -40,7 +40,7 @@ impl Garment {
         let thickness = given_thickness(run, number)?.unwrap_or_else(|| cloth_thickness(garment_type));
         let layer = run.layers[number].clone();
         let name = if layer == BODY_TAKE { CLOTHES.into() } else { layer.clone() };
-        Ok(Self { number, garment_type, thickness, layer, name })
+        Ok(Self { number: Some(number), garment_type, thickness, layer, name })
     }
 }
 
@@ -57,7 +57,15 @@ pub fn stacked(run: &Run) -> Result<Vec<Garment>, PipelineError> {
             out.push(Garment::new(run, number, &cut.result)?);
         }
     }
-    Ok(out)
+    with_worn(run, out)
+}
+
+/// The garments of all takes with those that were put on from elsewhere among them; alone where the run ends before the last take.
+///
+/// # Errors
+/// [`PipelineError`] where one of those cannot be read, or its place is not there.
+pub fn with_worn(run: &Run, takes: Vec<Garment>) -> Result<Vec<Garment>, PipelineError> {
+    if run.is_whole() { worn::among(takes, &worn::listed(&run.folders)?, &run.folders) } else { Ok(takes) }
 }
 
 /// Thickness of the cloth of take `number`'s garment, as `subject.toml` gives it, metres.

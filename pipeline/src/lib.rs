@@ -53,6 +53,8 @@ pub mod steps;
 mod summary;
 mod take_order;
 mod ticket;
+mod wear;
+mod worn;
 
 pub use animate::{AnimateOptions, Animated, AnimationReport, Profile, animate};
 pub use asked::Asked;
@@ -82,3 +84,5 @@ pub use step::{Product, Remarks, Step};
 pub use summary::{Decided, Measured, Summary, TakeSummary};
 pub use ticket::Ticket;
 pub use toile_animation::blend::Blend;
+pub use wear::{Dressed, WearOptions, put_on, take_off};
+pub use worn::{Place, WornFile, WornGarment, listed as listed_worn};

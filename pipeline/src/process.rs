@@ -25,10 +25,12 @@ use crate::{
         read_scan::ReadScan,
         stack::Stack,
         texture::Texturing,
+        wear::Wear,
     },
     summary::{Measured, Summary, TakeSummary},
     take_order,
     ticket::Ticket,
+    worn,
 };
 
 /// Takes the subject at `root` to `goal`, doing whatever is missing.
@@ -131,10 +133,27 @@ fn dress(run: &Run, model: &BodyModel, body: &Body, summary: &mut Summary) -> Re
         }
         (summary.decided.takes[number].pose, summary.decided.takes[number].cut) = (pose, Some(cut));
     }
+    let garments = put_on(run, model, body, garments, summary)?;
     let stacked = summary.hear(run.step(&Stack { run, body, garments: &garments })?);
     summary.decided.stack = Some(stacked);
     summary.layers.extend(garments.iter().map(|g| g.name.clone()));
     Ok(garments)
+}
+
+/// The garments with those that were put on from elsewhere among them.
+fn put_on(
+    run: &Run,
+    model: &BodyModel,
+    body: &Body,
+    garments: Vec<Garment>,
+    summary: &mut Summary,
+) -> Result<Vec<Garment>, PipelineError> {
+    if run.is_whole() {
+        for worn in &worn::listed(&run.folders)? {
+            summary.hear(run.step(&Wear { run, worn, body, model })?);
+        }
+    }
+    garment::with_worn(run, garments)
 }
 
 /// The avatar's files, and the page.

@@ -125,13 +125,16 @@ impl Export<'_> {
         let (name, weights) = (BODY.to_string(), body.weights.clone());
         let mesh = read_mesh(&folders.body_mesh())?;
         let mut layers = vec![AvatarLayer { name, mesh, weights, order: 0, garment: None, thickness: None }];
+        let mut order = 0;
         for garment in self.garments {
+            // Over the layer below, whatever is missing between.
+            order = garment.number.map_or(0, |n| n + 1 - self.run.first_garment()).max(order + 1);
             let (mesh, weights) = read_skinned(&folders.garment(&garment.layer))?;
             layers.push(AvatarLayer {
                 name: garment.name.clone(),
                 mesh,
                 weights,
-                order: (garment.number + 1 - self.run.first_garment()) as u32,
+                order: order as u32,
                 garment: Some(garment.garment_type.to_string()),
                 thickness: Some(garment.thickness),
             });

@@ -9,6 +9,7 @@ pub mod pose;
 pub mod read_scan;
 pub mod stack;
 pub mod texture;
+pub mod wear;
 
 use crate::step::Step;
 
@@ -35,6 +36,7 @@ pub const STEPS: &[StepFacts] = &[
     facts::<fit::Fit>(),
     facts::<pose::PoseUnder>(),
     facts::<cut::Cut>(),
+    facts::<wear::Wear>(),
     facts::<stack::Stack>(),
     facts::<export::Export>(),
     facts::<page::Page>(),

@@ -32,3 +32,4 @@ pub mod shape;
 mod springs;
 pub mod synthesize;
 pub mod texture_size;
+pub mod wear;
