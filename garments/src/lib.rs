@@ -29,6 +29,7 @@ mod edits;
 mod error;
 mod extract;
 mod follow;
+mod generic;
 mod hem;
 mod labels;
 mod measure;
@@ -50,6 +51,7 @@ pub use edits::{
 pub use error::GarmentError;
 pub use extract::{Extraction, extract, find_cloth};
 pub use follow::follow;
+pub use generic::{Conformed, ConformedReport, Generic, GenericGarment, conform_generic, make_generic};
 pub use labels::{
     template::cloth_thickness,
     types::{Labels, Reason},
@@ -60,6 +62,7 @@ pub use settings::{CullSettings, ExtractSettings, Labelling, StackMethod, StackS
 pub use skin::{common_frame::weights as weights_from_body, hanging::mark_free, layer_weights::carry_weights};
 pub use stack::{
     Apart,
+    press::{Part, PressReport, press_in},
     report::{GAP_BINS_MM, LayerReport, StackReport},
     stack,
 };

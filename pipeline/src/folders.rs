@@ -98,6 +98,11 @@ impl Folders {
         self.layer(layer).join("unstacked.ply")
     }
 
+    /// A generic garment in its shape, before stacking; only where those are asked for.
+    pub fn generic(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("generic.ply")
+    }
+
     /// The garment in the common frame, over all layers below.
     pub fn garment(&self, layer: &str) -> PathBuf {
         self.layer(layer).join("garment.ply")
@@ -151,6 +156,11 @@ impl Folders {
     /// Where the stages over all layers keep their records.
     pub fn layers(&self) -> PathBuf {
         self.build().join("layers")
+    }
+
+    /// The body with what crossed a garment moved inwards; only where that is asked for.
+    pub fn pressed_body(&self) -> PathBuf {
+        self.layers().join("body.ply")
     }
 
     /// Where writing the deliverables keeps its record.

@@ -1,9 +1,11 @@
 //! Facts about a garment: its type and the thickness of its cloth.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 use toile_garments::{ExtractionReport, GarmentType, cloth_thickness};
 
-use crate::{PipelineError, Record, Run, record, step::Step, steps::cut::Cut, worn};
+use crate::{Folders, PipelineError, Run};
 
 /// No cloth is taken for thicker, millimetres: stacking looks twice as far for the layers below.
 pub const THICKEST_MM: f32 = 10.0;
@@ -28,6 +30,9 @@ pub struct Garment {
     /// Its name in the avatar and the report: the folder's, but for the clothes of a first take that is called `body`.
     #[serde(skip)]
     pub name: String,
+    /// Whether a generic garment stands for it.
+    #[serde(skip)]
+    pub is_generic: bool,
 }
 
 impl Garment {
@@ -40,32 +45,15 @@ impl Garment {
         let thickness = given_thickness(run, number)?.unwrap_or_else(|| cloth_thickness(garment_type));
         let layer = run.layers[number].clone();
         let name = if layer == BODY_TAKE { CLOTHES.into() } else { layer.clone() };
-        Ok(Self { number: Some(number), garment_type, thickness, layer, name })
+        Ok(Self { number: Some(number), garment_type, thickness, layer, name, is_generic: false })
     }
 }
 
-/// The garments that the last run stacked.
-///
-/// # Errors
-/// [`PipelineError`] where a record cannot be read.
-pub fn stacked(run: &Run) -> Result<Vec<Garment>, PipelineError> {
-    let mut out = Vec::new();
-    for number in run.first_garment()..run.layers.len() {
-        let folder = run.folders.layer(&run.layers[number]);
-        let cut: Option<Record<ExtractionReport>> = record::read(&folder, Cut::NAME)?;
-        if let Some(cut) = cut.filter(|_| run.folders.garment(&run.layers[number]).is_file()) {
-            out.push(Garment::new(run, number, &cut.result)?);
-        }
+impl Garment {
+    /// Its mesh before stacking.
+    pub fn unstacked(&self, folders: &Folders) -> PathBuf {
+        if self.is_generic { folders.generic(&self.layer) } else { folders.unstacked(&self.layer) }
     }
-    with_worn(run, out)
-}
-
-/// The garments of all takes with those that were put on from elsewhere among them; alone where the run ends before the last take.
-///
-/// # Errors
-/// [`PipelineError`] where one of those cannot be read, or its place is not there.
-pub fn with_worn(run: &Run, takes: Vec<Garment>) -> Result<Vec<Garment>, PipelineError> {
-    if run.is_whole() { worn::among(takes, &worn::listed(&run.folders)?, &run.folders) } else { Ok(takes) }
 }
 
 /// Thickness of the cloth of take `number`'s garment, as `subject.toml` gives it, metres.

@@ -34,6 +34,7 @@ pub mod motion;
 mod observer;
 mod opened;
 mod options;
+mod outfit;
 mod plan;
 mod process;
 mod record;

@@ -149,6 +149,7 @@ impl WornGarment {
             thickness: self.file.thickness_mm.map_or_else(|| cloth_thickness(self.file.garment_type), |mm| mm * 1e-3),
             layer: self.label.clone(),
             name: self.label.clone(),
+            is_generic: false,
         }
     }
 }
@@ -185,71 +186,5 @@ impl WornFile {
             rest_joints: rest(&cloth.body.skeleton),
             pose: cloth.pose.clone(),
         }
-    }
-}
-
-/// The layers of the takes with what is `worn` among them, inside to outside.
-///
-/// # Errors
-/// [`PipelineError`] where something is worn over or under a layer that is not there.
-pub fn among(takes: Vec<Garment>, worn: &[WornGarment], folders: &Folders) -> Result<Vec<Garment>, PipelineError> {
-    let mut layers = takes;
-    for garment in worn {
-        let at = |name: &String| {
-            let names = || layers.iter().map(|l| l.name.clone()).collect::<Vec<_>>().join(", ");
-            let found = layers.iter().position(|l| l.name == *name || l.layer == *name);
-            found.ok_or_else(|| {
-                let reason = format!("there is no layer `{name}`; there are: {}", names());
-                PipelineError::field(&folders.worn_json(&garment.label), "place", reason)
-            })
-        };
-        let place = match &garment.file.place {
-            Place::Outermost => layers.len(),
-            Place::Over(name) => at(name)? + 1,
-            Place::Under(name) => at(name)?,
-        };
-        if layers.iter().any(|l| l.name == garment.label) {
-            let folder = folders.worn(&garment.label);
-            return Err(PipelineError::refused(&folder, "a take has the same name now; rename this folder"));
-        }
-        layers.insert(place, garment.layer());
-    }
-    Ok(layers)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn worn(label: &str, place: Place) -> WornGarment {
-        let file = WornFile {
-            version: VERSION,
-            source: "alder/03-jacket".into(),
-            garment: String::new(),
-            garment_type: GarmentType::Jacket,
-            thickness_mm: None,
-            place,
-            rest_joints: BTreeMap::new(),
-            pose: Pose::identity(),
-        };
-        WornGarment { label: label.into(), file }
-    }
-
-    #[test]
-    fn what_is_worn_stands_where_it_was_said_and_nowhere_else() {
-        let folders = Folders::new(std::path::Path::new("/anna"));
-        let takes = || vec![worn("01-skirt", Place::Outermost).layer(), worn("02-blouse", Place::Outermost).layer()];
-        let order = |worn: &[WornGarment]| {
-            Ok::<_, PipelineError>(among(takes(), worn, &folders)?.into_iter().map(|l| l.name).collect::<Vec<_>>())
-        };
-        let some = [
-            worn("03-coat", Place::Outermost),
-            worn("04-vest", Place::Under("02-blouse".into())),
-            worn("05-cape", Place::Over("01-skirt".into())),
-        ];
-        assert_eq!(order(&some).unwrap(), ["01-skirt", "05-cape", "04-vest", "02-blouse", "03-coat"]);
-        let lost = order(&[worn("03-coat", Place::Over("02-shirt".into()))]).unwrap_err().to_string();
-        assert!(lost.contains("worn.json") && lost.contains("02-shirt") && lost.contains("02-blouse"), "{lost}");
-        assert!(order(&[worn("02-blouse", Place::Outermost)]).unwrap_err().to_string().contains("rename"));
     }
 }

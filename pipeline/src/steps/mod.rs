@@ -4,6 +4,7 @@ pub mod cut;
 pub mod export;
 pub mod fit;
 pub mod fuse;
+pub mod generic;
 pub mod page;
 pub mod pose;
 pub mod read_scan;
@@ -36,6 +37,7 @@ pub const STEPS: &[StepFacts] = &[
     facts::<fit::Fit>(),
     facts::<pose::PoseUnder>(),
     facts::<cut::Cut>(),
+    facts::<generic::Generic>(),
     facts::<wear::Wear>(),
     facts::<stack::Stack>(),
     facts::<export::Export>(),

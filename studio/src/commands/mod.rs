@@ -8,6 +8,7 @@ pub mod calibrate;
 mod calibrate_board;
 pub mod capture;
 pub mod catalog;
+mod cloth;
 pub mod completions;
 pub mod demo;
 pub mod devices;

@@ -10,7 +10,8 @@ use toile_pipeline::{Dressed, Place, WearOptions, put_on, take_off};
 use crate::{StudioError, commands::reach::must_exist, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
-GARMENT is a layer of another subject that is processed (SUBJECT/LAYER). It is resized as the one body differs from the other, put
+GARMENT is a layer of another subject that is processed (SUBJECT/LAYER), or a generic garment: t-shirt, shirt, jumper, jacket, coat,
+trousers, shorts, skirt. It is resized as the one body differs from the other, put
 outside of everything below it without crossings, and is from then on a layer like those that were scanned: `process`, `export`,
 `animate` and the console take it along. It is kept in SUBJECT/worn/, with the body that it was cut from, so that the other subject
 is not needed again. Takes are not changed.
@@ -18,13 +19,14 @@ is not needed again. Takes are not changed.
 Examples:
   toile wear alder/jacket birch                     over everything that birch wears
   toile wear alder/jacket birch --under 02-blouse
+  toile wear t-shirt birch --name summer            a generic garment
   toile wear jacket birch --off                     take it off again";
 
 /// Put a garment of another subject on this one, resized to its body
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Wear {
-    /// The garment: SUBJECT/LAYER; with --off, the name of the layer
+    /// The garment: SUBJECT/LAYER or the name of a generic one; with --off, the name of the layer
     garment: PathBuf,
     /// Who is to wear it
     subject: PathBuf,
