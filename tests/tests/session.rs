@@ -220,7 +220,7 @@ fn what_is_put_on_is_a_layer_for_any_number_of_threads_and_leaves_no_trace_when_
     assert!(nodes.as_array().unwrap().iter().any(|n| n["name"] == layer && n["skin"] == 0), "{nodes}");
     let (code, again) = wear(&one, &["t-shirt"]);
     assert!(code == Some(1) && again["error"]["message"].as_str().unwrap().contains("already"), "{again}");
-    let (code, own) = wear(&one, &[made.join("01-trousers").to_str().unwrap()]);
+    let (code, own) = wear(&two, &[made.join("01-trousers").to_str().unwrap()]);
     assert!(code == Some(1) && own["error"]["message"].as_str().unwrap().contains("scanned in it"), "{own}");
     assert_eq!(wear(&two, &["t-shirt", "--threads", "2"]).0, Some(0));
     assert_same(&one, &two);
