@@ -6,7 +6,8 @@
 //! - [`write_textured`]: one mesh with a texture, without bones;
 //! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named, and with springs where parts hang loose;
 //! - [`write_usda`]: layers, skeleton and motions as USD text;
-//! - [`write_obj`], [`write_mtl`]: the layers at rest as OBJ.
+//! - [`write_obj`], [`write_mtl`]: the layers at rest as OBJ;
+//! - [`read_avatar`]: layers with their skin, skeleton and pose out of a GLB file.
 //!
 //! ```
 //! use nalgebra::Point3;
@@ -36,6 +37,7 @@
 //! # Ok::<(), toile_avatar::AvatarError>(())
 //! ```
 
+mod avatar_file;
 mod buffer;
 mod clip;
 mod dressed;
@@ -52,6 +54,7 @@ mod textured;
 mod usda;
 mod vrm;
 
+pub use avatar_file::{AvatarFile, FileLayer, read_avatar};
 pub use dressed::{Avatar, AvatarLayer};
 pub use error::AvatarError;
 pub use glb::write_glb;

@@ -15,7 +15,7 @@
 //! [`carry_weights`] gives layers that lie close over one another like weights, and none that a stride tears. `worn` examines
 //! the result: [`posed_report`] poses the layers, [`hidden_triangles`] finds triangles that are never in sight.
 //!
-//! [`follow()`] takes all of them along where the body's shape is changed.
+//! [`follow()`] takes all of them along where the body's shape is changed; [`wear()`] brings a garment of one person onto another.
 //!
 //! The seed's own way stays selectable: [`Labelling::NearestBodyVertex`] and [`StackMethod::PushAlongNormal`].
 //!
@@ -29,6 +29,7 @@ mod edits;
 mod error;
 mod extract;
 mod follow;
+mod generic;
 mod hem;
 mod labels;
 mod measure;
@@ -39,6 +40,7 @@ mod settings;
 mod skin;
 mod stack;
 mod take;
+mod wear;
 mod worn;
 
 pub use edits::{
@@ -49,6 +51,7 @@ pub use edits::{
 pub use error::GarmentError;
 pub use extract::{Extraction, extract, find_cloth};
 pub use follow::follow;
+pub use generic::{Conformed, ConformedReport, Generic, GenericGarment, conform_generic, make_generic};
 pub use labels::{
     template::cloth_thickness,
     types::{Labels, Reason},
@@ -59,11 +62,13 @@ pub use settings::{CullSettings, ExtractSettings, Labelling, StackMethod, StackS
 pub use skin::{common_frame::weights as weights_from_body, hanging::mark_free, layer_weights::carry_weights};
 pub use stack::{
     Apart,
+    press::{Part, PressReport, press_in},
     report::{GAP_BINS_MM, LayerReport, StackReport},
     stack,
 };
 pub use take::DressedTake;
 pub use toile_character::{FREE_PART, GarmentType};
+pub use wear::{Person, wear};
 pub use worn::{
     hidden::hidden_triangles,
     posed::{PosedReport, TORN, Worn, posed_report},

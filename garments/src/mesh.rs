@@ -69,6 +69,17 @@ pub(crate) fn garment_mesh(
     uncrumple(draft, on, settings).finished()
 }
 
+/// The part of `mesh` where `field`, one value a vertex, is positive; triangles that its zero line crosses are split.
+pub(crate) fn part_where_positive(mesh: &Mesh, field: &[f32]) -> Mesh {
+    cut_positive(Draft::of(mesh), field).surface
+}
+
+/// `mesh` with places that cross themselves smoothed apart, as far as that goes.
+pub(crate) fn untangled(mut mesh: Mesh) -> Mesh {
+    untangle::untangle(&mut mesh);
+    mesh
+}
+
 /// The draft without places that cross themselves: smoothed apart, or cut away near rims.
 fn uncrumple(mut draft: Draft, on: &Measured, settings: &ExtractSettings) -> Draft {
     for _ in 0..CRUMPLED_ROUNDS {

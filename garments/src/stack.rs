@@ -19,6 +19,7 @@ mod fair;
 mod layer;
 mod patience;
 mod pile;
+pub mod press;
 mod push;
 mod push_out;
 mod region;

@@ -27,8 +27,8 @@ pub use self::{
     report::AnimationReport,
 };
 use crate::{
-    Goal, Observer, Options, PipelineError, Run, avatar_choice::AvatarChoice, body_file::Body, garment,
-    options::MotionChoice, process::process, settings, step::Remarks, steps::export,
+    Goal, Observer, Options, PipelineError, Run, avatar_choice::AvatarChoice, body_file::Body, options::MotionChoice,
+    outfit, process::process, settings, step::Remarks, steps::export,
 };
 
 /// Expected seconds a frame of a garment.
@@ -62,7 +62,7 @@ pub fn animate(root: &Path, options: &AnimateOptions, observer: &dyn Observer) -
     let model = BodyModel::load_default()?;
     let body = Body::load(&run.folders, run.first_layer(), &model)?;
     let choice = AvatarChoice::read(&run.folders)?;
-    let garments = garment::stacked(&run)?;
+    let garments = outfit::stacked(&run)?;
     let export = export::Export { run: &run, body: &body, garments: &garments, choice: &choice };
     let path = match &options.motion {
         MotionChoice::AsBefore => choice.motion_path(&run.folders),

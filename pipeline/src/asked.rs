@@ -36,6 +36,9 @@ pub struct Asked {
     pub subject: String,
     /// SHA-256 of every file below `edits/`, by its path in the subject's folder.
     pub edits: BTreeMap<String, String>,
+    /// SHA-256 of every file below `worn/`, the same way.
+    #[serde(default)]
+    pub worn: BTreeMap<String, String>,
 }
 
 impl Asked {
@@ -55,19 +58,14 @@ impl Asked {
     /// # Errors
     /// [`PipelineError`] where `subject.toml` or edits cannot be read.
     pub fn of(folders: &Folders, settings: &Settings, layers: Vec<String>) -> Result<Self, PipelineError> {
-        let mut files = Vec::new();
-        list(&folders.root.join("edits"), &mut files)?;
-        let name = |path: &Path| path.strip_prefix(&folders.root).unwrap_or(path).to_string_lossy().into_owned();
         Ok(Self {
             program: PROGRAM.into(),
             steps: STEPS.iter().map(|step| (step.name.to_string(), step.version)).collect(),
             settings: json::plain(settings)?,
             layers,
             subject: hash::file(&folders.subject_toml())?,
-            edits: files
-                .iter()
-                .map(|path| Ok((name(path), hash::file(path)?)))
-                .collect::<Result<_, PipelineError>>()?,
+            edits: hashes_below(&folders.root.join("edits"), folders)?,
+            worn: hashes_below(&folders.all_worn(), folders)?,
         })
     }
 
@@ -99,6 +97,9 @@ impl Asked {
             }
         }
         found.extend(self.changed_edits(now));
+        if self.worn != now.worn {
+            found.push((rank_of("wear"), None, "what is worn without a scan changed".to_string()));
+        }
         if self.subject != now.subject && found.is_empty() {
             found.push((STEPS.len(), None, "subject.toml changed".to_string()));
         }
@@ -136,6 +137,14 @@ const SETTINGS: [(&str, &str); 7] = [
 /// The place of a step in the order of [`STEPS`]; an unknown one counts as the first.
 pub(crate) fn rank_of(step: &str) -> usize {
     STEPS.iter().position(|s| s.name == step).unwrap_or(0)
+}
+
+/// SHA-256 of every file below `folder`, by its path in the subject's folder.
+fn hashes_below(folder: &Path, folders: &Folders) -> Result<BTreeMap<String, String>, PipelineError> {
+    let mut files = Vec::new();
+    list(folder, &mut files)?;
+    let name = |path: &Path| path.strip_prefix(&folders.root).unwrap_or(path).to_string_lossy().into_owned();
+    files.iter().map(|path| Ok((name(path), hash::file(path)?))).collect()
 }
 
 /// Every regular file below `folder`; links are not followed.

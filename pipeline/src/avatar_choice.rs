@@ -9,7 +9,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 use toile_capture::files::{atomic_write, is_there, read_limited};
 use toile_character::JointNaming;
-use toile_garments::CullSettings;
+use toile_garments::{CullSettings, Part};
 
 use crate::{
     PipelineError,
@@ -32,6 +32,12 @@ pub struct AvatarChoice {
     /// Whether loose parts swing in `avatar.vrm`; without, as the settings say.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub springs: Option<Springs>,
+    /// Generic garments stand for those that were cut out of the takes.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub generic: bool,
+    /// What gives way where a garment is too tight for the body.
+    #[serde(skip_serializing_if = "Part::is_cloth")]
+    pub part: Part,
     /// The formats that it is written in beside GLB and VRM.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub formats: Vec<FileFormat>,
@@ -75,6 +81,25 @@ impl AvatarChoice {
         Ok(choice)
     }
 
+    /// The choices now as far as garments are concerned; the others stay as before until [`AvatarChoice::choose`].
+    ///
+    /// # Errors
+    /// [`PipelineError`] where the file cannot be read or written.
+    pub fn choose_cloth(folders: &Folders, options: &Options) -> Result<Self, PipelineError> {
+        let mut choice = Self::read(folders)?;
+        let (generic, part) = (options.generic.unwrap_or(choice.generic), options.part.unwrap_or(choice.part));
+        if (generic, part) != (choice.generic, choice.part) {
+            (choice.generic, choice.part) = (generic, part);
+            atomic_write(&folders.avatar_choice(), &json::pretty(&choice)?)?;
+        }
+        Ok(choice)
+    }
+
+    /// The file of the body that the garments are worn on.
+    pub fn body_mesh(&self, folders: &Folders) -> PathBuf {
+        if self.part == Part::Body { folders.pressed_body() } else { folders.body_mesh() }
+    }
+
     /// The file of the motion; `None` for the shipped walk.
     pub fn motion_path(&self, folders: &Folders) -> Option<PathBuf> {
         self.motion.as_ref().map(|name| folders.motions().join(name))
@@ -97,7 +122,10 @@ impl AvatarChoice {
             let names: Vec<&str> = self.formats.iter().map(|f| f.name()).collect();
             format!("files as {} (`toile export --to glb,vrm` for the usual ones alone)", names.join(", "))
         });
-        [motion, hidden, names, springs, formats].into_iter().flatten().collect()
+        let generic = self.generic.then(|| "generic garments (--generic=off for those that were cut)".to_string());
+        let part = (self.part == Part::Body)
+            .then(|| "a body that gives way to tight garments (--part cloth for cloth that does)".to_string());
+        [motion, hidden, names, springs, generic, part, formats].into_iter().flatten().collect()
     }
 }
 

@@ -52,7 +52,8 @@ impl Body {
     /// [`PipelineError`] where a file is missing or not what it should be.
     pub fn load(folders: &Folders, layer: &str, model: &BodyModel) -> Result<Self, PipelineError> {
         let path = folders.body_json();
-        let skeleton = skeleton(&path, &json::read(&path)?)?;
+        let found: BodyFile = json::read(&path)?;
+        let skeleton = skeleton(&path, &found.rest_joints)?;
         let mut mesh = ply::read(&folders.body_rest())?;
         mesh.recompute_normals();
         let skinned = SkinnedMesh::new(mesh, skeleton, model.weights.clone())?;
@@ -60,11 +61,14 @@ impl Body {
     }
 }
 
-/// The joints as the fit left them, whatever way it found them by.
-fn skeleton(path: &Path, body: &BodyFile) -> Result<Skeleton, PipelineError> {
+/// The joints as the fit left them, whatever way it found them by: `rest_joints` of the file `path`, by VRM name.
+///
+/// # Errors
+/// [`PipelineError`] where one is missing.
+pub fn skeleton(path: &Path, rest_joints: &BTreeMap<String, [f64; 3]>) -> Result<Skeleton, PipelineError> {
     let mut rest = [Point3::origin(); JOINT_COUNT];
     for joint in JOINTS {
-        let found = body.rest_joints.get(joint.name());
+        let found = rest_joints.get(joint.name());
         let lacks = || PipelineError::field(path, "rest_joints", format!("`{}` is missing", joint.name()));
         rest[joint.index()] = found.copied().map(Point3::from).ok_or_else(lacks)?;
     }

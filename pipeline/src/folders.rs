@@ -98,9 +98,29 @@ impl Folders {
         self.layer(layer).join("unstacked.ply")
     }
 
+    /// A generic garment in its shape, before stacking; only where those are asked for.
+    pub fn generic(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("generic.ply")
+    }
+
     /// The garment in the common frame, over all layers below.
     pub fn garment(&self, layer: &str) -> PathBuf {
         self.layer(layer).join("garment.ply")
+    }
+
+    /// Everything that is worn without having been scanned.
+    pub fn all_worn(&self) -> PathBuf {
+        self.root.join("worn")
+    }
+
+    /// One garment of those.
+    pub fn worn(&self, label: &str) -> PathBuf {
+        self.all_worn().join(label)
+    }
+
+    /// What is noted about it.
+    pub fn worn_json(&self, label: &str) -> PathBuf {
+        self.worn(label).join("worn.json")
     }
 
     /// The fitted body.
@@ -136,6 +156,11 @@ impl Folders {
     /// Where the stages over all layers keep their records.
     pub fn layers(&self) -> PathBuf {
         self.build().join("layers")
+    }
+
+    /// The body with what crossed a garment moved inwards; only where that is asked for.
+    pub fn pressed_body(&self) -> PathBuf {
+        self.layers().join("body.ply")
     }
 
     /// Where writing the deliverables keeps its record.

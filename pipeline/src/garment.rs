@@ -1,12 +1,14 @@
 //! Facts about a garment: its type and the thickness of its cloth.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 use toile_garments::{ExtractionReport, GarmentType, cloth_thickness};
 
-use crate::{PipelineError, Record, Run, record, step::Step, steps::cut::Cut};
+use crate::{Folders, PipelineError, Run};
 
 /// No cloth is taken for thicker, millimetres: stacking looks twice as far for the layers below.
-const THICKEST_MM: f32 = 10.0;
+pub const THICKEST_MM: f32 = 10.0;
 
 /// Folder name of a first take that was imported as the body, and the name of the clothes that it turned out to show.
 const BODY_TAKE: &str = "00-body";
@@ -15,8 +17,8 @@ const CLOTHES: &str = "00-clothes";
 /// A garment of the avatar.
 #[derive(Debug, Clone, Serialize)]
 pub struct Garment {
-    /// Number of the take that added it.
-    pub number: usize,
+    /// Number of the take that added it; none where it was put on from elsewhere.
+    pub number: Option<usize>,
     /// Its type: as `subject.toml` says, else guessed.
     #[serde(serialize_with = "as_text")]
     pub garment_type: GarmentType,
@@ -28,6 +30,9 @@ pub struct Garment {
     /// Its name in the avatar and the report: the folder's, but for the clothes of a first take that is called `body`.
     #[serde(skip)]
     pub name: String,
+    /// Whether a generic garment stands for it.
+    #[serde(skip)]
+    pub is_generic: bool,
 }
 
 impl Garment {
@@ -40,24 +45,15 @@ impl Garment {
         let thickness = given_thickness(run, number)?.unwrap_or_else(|| cloth_thickness(garment_type));
         let layer = run.layers[number].clone();
         let name = if layer == BODY_TAKE { CLOTHES.into() } else { layer.clone() };
-        Ok(Self { number, garment_type, thickness, layer, name })
+        Ok(Self { number: Some(number), garment_type, thickness, layer, name, is_generic: false })
     }
 }
 
-/// The garments that the last run stacked.
-///
-/// # Errors
-/// [`PipelineError`] where a record cannot be read.
-pub fn stacked(run: &Run) -> Result<Vec<Garment>, PipelineError> {
-    let mut out = Vec::new();
-    for number in run.first_garment()..run.layers.len() {
-        let folder = run.folders.layer(&run.layers[number]);
-        let cut: Option<Record<ExtractionReport>> = record::read(&folder, Cut::NAME)?;
-        if let Some(cut) = cut.filter(|_| run.folders.garment(&run.layers[number]).is_file()) {
-            out.push(Garment::new(run, number, &cut.result)?);
-        }
+impl Garment {
+    /// Its mesh before stacking.
+    pub fn unstacked(&self, folders: &Folders) -> PathBuf {
+        if self.is_generic { folders.generic(&self.layer) } else { folders.unstacked(&self.layer) }
     }
-    Ok(out)
 }
 
 /// Thickness of the cloth of take `number`'s garment, as `subject.toml` gives it, metres.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use toile_character::JointNaming;
 use toile_fusion::FusionSettings;
-use toile_garments::CullSettings;
+use toile_garments::{CullSettings, Part};
 
 use crate::{PipelineError, formats::FileFormat, motion};
 
@@ -35,6 +35,10 @@ pub struct Options {
     pub hidden: HiddenChoice,
     /// Whether loose parts swing in `avatar.vrm`; without, as before.
     pub springs: Option<Springs>,
+    /// Whether generic garments stand for those that were cut; without, as before.
+    pub generic: Option<bool>,
+    /// What gives way where a garment is too tight for the body; without, as before.
+    pub part: Option<Part>,
     /// The formats that the avatar is written in beside GLB and VRM; without, as before.
     pub formats: Option<Vec<FileFormat>>,
     /// Stop after this layer; without, all of them.

@@ -20,6 +20,7 @@ use crate::{
     resume::read_timings,
     steps::STEPS,
     ticket::{Ticket, step_folders},
+    worn::listed,
 };
 
 /// How a subject's results stand.
@@ -200,6 +201,9 @@ fn expected(subject: &Subject, folders: &Folders) -> Result<Vec<Expected>, Pipel
         add(layer, "cut", number);
     }
     let last = layers.len();
+    for worn in listed(folders)? {
+        add(&worn.label, "wear", last);
+    }
     add("layers", "stack", last);
     add("avatar", "export", last);
     add("report", "report", last);

@@ -13,22 +13,25 @@ use crate::{
     garment::{self, Garment},
     json,
     options::{Goal, MotionChoice, Options},
-    record, settings, stale,
+    outfit, record, settings, stale,
     step::Step,
     steps::{
         cut::Cut,
         export::{Export, Exported},
         fit::Fit,
         fuse::Fuse,
+        generic::Generic,
         page::Page,
         pose::PoseUnder,
         read_scan::ReadScan,
         stack::Stack,
         texture::Texturing,
+        wear::Wear,
     },
     summary::{Measured, Summary, TakeSummary},
     take_order,
     ticket::Ticket,
+    worn,
 };
 
 /// Takes the subject at `root` to `goal`, doing whatever is missing.
@@ -106,13 +109,20 @@ fn to_body(run: &Run, goal: Goal, options: &Options, summary: &mut Summary) -> R
         return Ok(());
     }
     let body = Body::load(folders, run.first_layer(), &model)?;
-    let garments = dress(run, &model, &body, summary)?;
+    let choice = AvatarChoice::choose_cloth(folders, options)?;
+    let garments = dress(run, &model, &body, &choice, summary)?;
     summary.files = garments.iter().map(|g| folders.garment(&g.layer)).collect();
     if goal == Goal::Garments { Ok(()) } else { deliver(run, &body, &garments, goal, options, summary) }
 }
 
 /// The garments of all takes, stacked; a take in which nothing new is worn gives none.
-fn dress(run: &Run, model: &BodyModel, body: &Body, summary: &mut Summary) -> Result<Vec<Garment>, PipelineError> {
+fn dress(
+    run: &Run,
+    model: &BodyModel,
+    body: &Body,
+    choice: &AvatarChoice,
+    summary: &mut Summary,
+) -> Result<Vec<Garment>, PipelineError> {
     let mut garments = Vec::new();
     for number in run.first_garment()..run.layers.len() {
         let pose = match number {
@@ -131,10 +141,33 @@ fn dress(run: &Run, model: &BodyModel, body: &Body, summary: &mut Summary) -> Re
         }
         (summary.decided.takes[number].pose, summary.decided.takes[number].cut) = (pose, Some(cut));
     }
-    let stacked = summary.hear(run.step(&Stack { run, body, garments: &garments })?);
+    if choice.generic {
+        for garment in &mut garments {
+            summary.hear(run.step(&Generic { run, garment, body, model })?);
+            garment.is_generic = true;
+        }
+    }
+    let garments = put_on(run, model, body, garments, summary)?;
+    let stacked = summary.hear(run.step(&Stack { run, body, garments: &garments, part: choice.part })?);
     summary.decided.stack = Some(stacked);
     summary.layers.extend(garments.iter().map(|g| g.name.clone()));
     Ok(garments)
+}
+
+/// The garments with those that were put on from elsewhere among them.
+fn put_on(
+    run: &Run,
+    model: &BodyModel,
+    body: &Body,
+    garments: Vec<Garment>,
+    summary: &mut Summary,
+) -> Result<Vec<Garment>, PipelineError> {
+    if run.is_whole() {
+        for worn in &worn::listed(&run.folders)? {
+            summary.hear(run.step(&Wear { run, worn, body, model })?);
+        }
+    }
+    outfit::with_worn(run, garments)
 }
 
 /// The avatar's files, and the page.

@@ -113,6 +113,11 @@ impl<'a> Run<'a> {
         self.layers.first().map_or("00-body", String::as_str)
     }
 
+    /// True where the run goes over all takes of the subject.
+    pub fn is_whole(&self) -> bool {
+        self.subject.as_ref().is_none_or(|subject| subject.layers().len() == self.layers.len())
+    }
+
     /// Whether the first take shows the person dressed: its layer is not called `body`, or `edits/body.json` says so.
     pub fn is_first_dressed(&self) -> bool {
         self.is_first_dressed

@@ -15,7 +15,7 @@ use toile_garments::{follow, stack};
 use toile_geometry::{Mesh, Rigid, ply};
 
 use crate::{
-    Goal, Observer, Options, PipelineError, Run, avatar_choice::AvatarChoice, body_file::Body, garment, json, motion,
+    Goal, Observer, Options, PipelineError, Run, avatar_choice::AvatarChoice, body_file::Body, json, motion, outfit,
     process::process, settings, step::Remarks, steps::export::Export,
 };
 
@@ -127,7 +127,7 @@ fn of_subject(run: &Run, model: &BodyModel, options: &ShapeOptions) -> Result<Wo
     let shaped = ShapeSearch::new(model, start)
         .and_then(|search| search.shape(&options.wanted))
         .map_err(|e| PipelineError::refused(&folders.root, e.to_string()))?;
-    let garments = garment::stacked(run)?;
+    let garments = outfit::stacked(run)?;
     let choice = AvatarChoice::read(folders)?;
     let dressed = Export { run, body: &body, garments: &garments, choice: &choice }.dressed()?;
     let before = &dressed.layers[0].mesh;

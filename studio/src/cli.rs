@@ -60,6 +60,8 @@ pub enum Command {
     Sculpt(commands::sculpt::Sculpt),
     /// A body by its measures, without a scan; or a subject with other measures
     Shape(commands::shape::Shape),
+    /// Put a garment of another subject on this one, resized to its body
+    Wear(commands::wear::Wear),
     /// Everything from recorded takes to avatar and report: runs whatever is missing
     Process(commands::process::Process),
     /// Process a whole archive: what is stale, side by side

@@ -25,6 +25,7 @@ fn help_shows_the_usual_way_and_every_command_has_an_example() {
         "animate",
         "sculpt",
         "shape",
+        "wear",
         "measure",
         "capture",
         "devices",

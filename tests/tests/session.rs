@@ -203,6 +203,32 @@ fn a_stroke_is_kept_heeded_at_each_rebuild_and_forgotten_on_request() {
 }
 
 #[test]
+fn what_is_put_on_is_a_layer_for_any_number_of_threads_and_leaves_no_trace_when_it_is_off() {
+    let made = demo();
+    let wear = |subject: &Path, words: &[&str]| {
+        let output = toile(&["wear"]).args(words).arg(subject).arg("--json").output().unwrap();
+        (output.status.code(), serde_json::from_slice::<Value>(&output.stdout).unwrap())
+    };
+    let ((_a, one), (_b, two)) = (copied(made), copied(made));
+    let (code, answer) = wear(&one, &["t-shirt", "--threads", "1"]);
+    assert_eq!(code, Some(0), "{answer}");
+    let crossing = answer["results"]["crossing_pairs"].as_object().unwrap();
+    assert!(crossing.values().all(|pairs| pairs == 0), "{answer}");
+    let layer = answer["results"]["layer"].as_str().unwrap();
+    assert!(layer.ends_with("-t-shirt") && answer["results"]["layers"].as_array().unwrap().last().unwrap() == layer);
+    let nodes = &glb_json(&one.join("avatar.glb"))["nodes"];
+    assert!(nodes.as_array().unwrap().iter().any(|n| n["name"] == layer && n["skin"] == 0), "{nodes}");
+    let (code, again) = wear(&one, &["t-shirt"]);
+    assert!(code == Some(1) && again["error"]["message"].as_str().unwrap().contains("already"), "{again}");
+    let (code, own) = wear(&two, &[made.join("01-trousers").to_str().unwrap()]);
+    assert!(code == Some(1) && own["error"]["message"].as_str().unwrap().contains("scanned in it"), "{own}");
+    assert_eq!(wear(&two, &["t-shirt", "--threads", "2"]).0, Some(0));
+    assert_same(&one, &two);
+    assert_eq!(wear(&one, &["t-shirt", "--off"]).0, Some(0));
+    assert_same(made, &one);
+}
+
+#[test]
 fn hidden_skin_is_left_out_on_request_and_comes_back() {
     let made = demo();
     let (_dir, subject) = copied(made);

@@ -69,8 +69,8 @@ impl Facts {
 
 /// Names, sizes and times of the files that [`Facts`] are read from; the same stamp, the same facts.
 pub(super) fn stamp(root: &Path) -> String {
-    let files =
-        ["subject.toml", "toile.toml", "takes", "edits", "build", "build/timings.json"].map(|name| root.join(name));
+    let files = ["subject.toml", "toile.toml", "takes", "worn", "edits", "build", "build/timings.json"]
+        .map(|name| root.join(name));
     let reports = folders_in(&root.join("build")).into_iter().map(|folder| folder.join("report.json"));
     let stamps = files.into_iter().chain(reports).map(|path| {
         let found =

@@ -75,7 +75,6 @@ pub(crate) struct Draft {
 
 impl Draft {
     /// A mesh with all channels 0. Attributes are left behind.
-    #[cfg(test)]
     pub fn of(mesh: &Mesh) -> Self {
         let surface = Mesh { attributes: std::collections::BTreeMap::new(), ..mesh.clone() };
         Self { channels: Channels::zero(surface.positions.len()), surface }

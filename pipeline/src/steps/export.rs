@@ -123,15 +123,18 @@ impl Export<'_> {
     pub(crate) fn dressed(&self) -> Result<Avatar, PipelineError> {
         let (folders, body) = (&self.run.folders, &self.body.skinned);
         let (name, weights) = (BODY.to_string(), body.weights.clone());
-        let mesh = read_mesh(&folders.body_mesh())?;
+        let mesh = read_mesh(&self.choice.body_mesh(folders))?;
         let mut layers = vec![AvatarLayer { name, mesh, weights, order: 0, garment: None, thickness: None }];
+        let mut order = 0;
         for garment in self.garments {
+            // Over the layer below, whatever is missing between.
+            order = garment.number.map_or(0, |n| n + 1 - self.run.first_garment()).max(order + 1);
             let (mesh, weights) = read_skinned(&folders.garment(&garment.layer))?;
             layers.push(AvatarLayer {
                 name: garment.name.clone(),
                 mesh,
                 weights,
-                order: (garment.number + 1 - self.run.first_garment()) as u32,
+                order: order as u32,
                 garment: Some(garment.garment_type.to_string()),
                 thickness: Some(garment.thickness),
             });
@@ -158,7 +161,7 @@ impl Step for Export<'_> {
 
     fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
         let folders = &self.run.folders;
-        let of_body = [folders.body_mesh(), folders.body_json(), folders.pose(self.run.first_layer())];
+        let of_body = [self.choice.body_mesh(folders), folders.body_json(), folders.pose(self.run.first_layer())];
         let of_garments = self.garments.iter().map(|g| folders.garment(&g.layer));
         Ok(of_body.into_iter().chain(of_garments).chain(self.motion_path()).collect())
     }

@@ -4,11 +4,13 @@ pub mod cut;
 pub mod export;
 pub mod fit;
 pub mod fuse;
+pub mod generic;
 pub mod page;
 pub mod pose;
 pub mod read_scan;
 pub mod stack;
 pub mod texture;
+pub mod wear;
 
 use crate::step::Step;
 
@@ -35,6 +37,8 @@ pub const STEPS: &[StepFacts] = &[
     facts::<fit::Fit>(),
     facts::<pose::PoseUnder>(),
     facts::<cut::Cut>(),
+    facts::<generic::Generic>(),
+    facts::<wear::Wear>(),
     facts::<stack::Stack>(),
     facts::<export::Export>(),
     facts::<page::Page>(),

@@ -59,7 +59,7 @@ impl Step for Page<'_> {
 
     fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
         let folders = &self.run.folders;
-        let of_body = [folders.body_mesh(), folders.body_json(), folders.measurements(), folders.glb()];
+        let of_body = [self.choice.body_mesh(folders), folders.body_json(), folders.measurements(), folders.glb()];
         let scans = self.run.layers.iter().map(|l| folders.scan(l));
         let garments = self.garments.iter().map(|g| folders.garment(&g.layer));
         Ok(of_body.into_iter().chain(scans).chain(garments).collect())
@@ -95,7 +95,7 @@ impl Page<'_> {
         let read_scan = |layer: &String| Ok((layer.clone(), read_mesh(&folders.scan(layer))?));
         let read_garment = |garment: &Garment| read_skinned(&folders.garment(&garment.layer));
         let worn: Vec<(Mesh, SkinWeights)> = self.garments.iter().map(read_garment).collect::<Result<_, _>>()?;
-        let body = read_mesh(&folders.body_mesh())?;
+        let body = read_mesh(&self.choice.body_mesh(folders))?;
         let table: MeasureTable = json::read(&folders.measurements())?;
         let found: BodyFile = json::read(&folders.body_json())?;
         let floor = body.bounds().map_or(0.0, |(low, _)| f64::from(low.y));

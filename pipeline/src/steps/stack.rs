@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use toile_character::SkinWeights;
-use toile_garments::{FREE_PART, LayerReport, carry_weights, stack};
-use toile_geometry::Mesh;
+use toile_garments::{FREE_PART, LayerReport, Part, PressReport, carry_weights, press_in, stack};
+use toile_geometry::{Mesh, ply};
 
 use crate::{
     PipelineError, Run,
@@ -28,6 +28,8 @@ pub struct Stack<'a> {
     pub body: &'a Body,
     /// The garments, inside to outside.
     pub garments: &'a [Garment],
+    /// What gives way where a garment is too tight for the body.
+    pub part: Part,
 }
 
 /// The decisions of stacking, by garment from inside to outside.
@@ -37,6 +39,9 @@ pub struct Stacked {
     pub layers: Vec<LayerReport>,
     /// Share of each one's vertices that hang free of the body, where it is a skirt or dress.
     pub free_share: Vec<Option<f32>>,
+    /// How the body gave way, where it was to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressed: Option<PressReport>,
 }
 
 impl Step for Stack<'_> {
@@ -57,15 +62,21 @@ impl Step for Stack<'_> {
     fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
         let folders = &self.run.folders;
         let of_body = [folders.body_mesh(), folders.body_json(), folders.pose(self.run.first_layer())];
-        Ok(of_body.into_iter().chain(self.garments.iter().map(|g| folders.unstacked(&g.layer))).collect())
+        Ok(of_body.into_iter().chain(self.garments.iter().map(|g| g.unstacked(folders))).collect())
     }
 
     fn settings(&self) -> Result<Value, PipelineError> {
-        Ok(json!({ "stack": json::plain(&self.run.settings.stack)?, "garments": json::plain(&self.garments)? }))
+        let mut settings =
+            json!({ "stack": json::plain(&self.run.settings.stack)?, "garments": json::plain(&self.garments)? });
+        if self.part == Part::Body {
+            settings["part"] = json::plain(&self.part)?;
+        }
+        Ok(settings)
     }
 
     fn outputs(&self) -> Vec<PathBuf> {
-        self.garments.iter().map(|g| self.run.folders.garment(&g.layer)).collect()
+        let pressed = (self.part == Part::Body).then(|| self.run.folders.pressed_body());
+        self.garments.iter().map(|g| self.run.folders.garment(&g.layer)).chain(pressed).collect()
     }
 
     fn seconds(&self) -> f64 {
@@ -74,19 +85,24 @@ impl Step for Stack<'_> {
 
     fn work(&self, progress: &(dyn Fn(f32) + Sync)) -> Result<Product<Stacked>, PipelineError> {
         let folders = &self.run.folders;
-        let body_mesh = read_mesh(&folders.body_mesh())?;
-        let read = self.garments.iter().map(|g| read_skinned(&folders.unstacked(&g.layer)));
+        let mut body_mesh = read_mesh(&folders.body_mesh())?;
+        let read = self.garments.iter().map(|g| read_skinned(&g.unstacked(folders)));
         let (mut layers, mut weights): (Vec<Mesh>, Vec<SkinWeights>) =
             read.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let thickness: Vec<f32> = self.garments.iter().map(|g| g.thickness).collect();
         let wrong = |e| PipelineError::stage(&folders.layers(), e);
+        let gap = |thickness: &f32| self.run.settings.stack.gap_of(*thickness);
+        let pressed = match self.part {
+            Part::Cloth => None,
+            Part::Body => Some(press_in(&mut body_mesh, &layers, &thickness.iter().map(gap).collect::<Vec<_>>())),
+        };
         let report = stack(&body_mesh, &mut layers, &thickness, &self.run.settings.stack, progress).map_err(wrong)?;
         carry_weights(&layers, &mut weights, &self.body.skinned.skeleton, &self.body.pose0).map_err(wrong)?;
         let encoded = layers.iter().zip(&weights).map(|(mesh, weights)| encode_skinned(mesh, weights));
-        let files = self.outputs().into_iter().zip(encoded).collect();
+        let files = self.outputs().into_iter().zip(encoded.chain([ply::encode(&body_mesh)])).collect();
         let said = self.garments.iter().zip(&report.layers).flat_map(|(g, report)| warnings(&g.name, report)).collect();
         let free_share = layers.iter().map(free_share).collect();
-        Ok(Product::new(files, Stacked { layers: report.layers, free_share }, said))
+        Ok(Product::new(files, Stacked { layers: report.layers, free_share, pressed }, said))
     }
 }
 

@@ -119,10 +119,11 @@ impl Summaries {
 
 /// The files and folders whose times change whenever a summary does.
 fn stamp(path: &Path) -> Stamp {
-    let mut files: Vec<PathBuf> =
-        ["", "subject.toml", "takes", "edits", "build", "avatar.glb", "report.html"].map(|name| path.join(name)).into();
-    let below =
-        ["build", "edits", "takes"].map(|folder| fs::read_dir(path.join(folder)).into_iter().flatten().flatten());
+    let mut files: Vec<PathBuf> = ["", "subject.toml", "takes", "worn", "edits", "build", "avatar.glb", "report.html"]
+        .map(|name| path.join(name))
+        .into();
+    let below = ["build", "edits", "takes", "worn"]
+        .map(|folder| fs::read_dir(path.join(folder)).into_iter().flatten().flatten());
     files.extend(below.into_iter().flatten().map(|entry| entry.path()));
     let of = |path: &PathBuf| {
         let about = fs::symlink_metadata(path).ok()?;
@@ -178,7 +179,8 @@ fn is_newest(folders: &Folders) -> bool {
     let [Some(avatar), Some(report)] = made else { return false };
     let listed = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().flatten();
     let time = |path: &Path| fs::symlink_metadata(path).and_then(|about| about.modified()).ok();
-    let given = ["takes", "edits"].into_iter().flat_map(|name| listed(root.join(name))).map(|entry| entry.path());
+    let given =
+        ["takes", "worn", "edits"].into_iter().flat_map(|name| listed(root.join(name))).map(|entry| entry.path());
     let garments = listed(folders.build()).map(|entry| entry.path().join("garment.ply"));
     let inputs = given.chain(garments).chain([folders.subject_toml()]);
     inputs.filter_map(|path| time(&path)).all(|time| time <= avatar && time <= report)

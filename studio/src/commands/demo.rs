@@ -93,7 +93,7 @@ fn subjects_in(recorded: &Path) -> Result<Vec<PathBuf>, StudioError> {
 
 /// Copies what was recorded, not what was built; files that are the same already stay.
 fn copy_subject(from: &Path, to: &Path) -> Result<(), StudioError> {
-    for name in ["subject.toml", "takes", "edits"] {
+    for name in ["subject.toml", "takes", "worn", "edits"] {
         copy(&from.join(name), &to.join(name))?;
     }
     Ok(())

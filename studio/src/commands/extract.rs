@@ -5,7 +5,10 @@ use toile_pipeline::{Goal, Options};
 
 use crate::{
     StudioError,
-    commands::reach::{must_exist, reach},
+    commands::{
+        cloth::ClothOptions,
+        reach::{must_exist, reach},
+    },
     outcome::Answer,
     session::Session,
 };
@@ -15,7 +18,9 @@ Runs the missing steps before it: fusing, the body, the poses.
 
 Examples:
   toile extract anna
-  toile extract anna trousers      only up to this layer";
+  toile extract anna trousers      only up to this layer
+  toile extract anna --generic     the same vertices and triangles for every subject
+  toile extract anna --part body   tight garments press the body in";
 
 /// Extract the garments from the dressed scans and stack them
 #[derive(Debug, clap::Args)]
@@ -25,6 +30,8 @@ pub struct Extract {
     subject: PathBuf,
     /// Stop after this layer, such as `trousers` or `01-trousers`
     layer: Option<String>,
+    #[command(flatten)]
+    cloth: ClothOptions,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
@@ -37,7 +44,13 @@ impl Extract {
     /// [`StudioError`] where a stage has no answer or files cannot be read or written.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
         must_exist(&self.subject)?;
-        let options = Options { last_layer: self.layer.clone(), settings: self.settings.clone(), ..Options::default() };
+        let options = Options {
+            last_layer: self.layer.clone(),
+            generic: self.cloth.generic(),
+            part: self.cloth.part(),
+            settings: self.settings.clone(),
+            ..Options::default()
+        };
         reach(&self.subject, Goal::Garments, &options, session)
     }
 }

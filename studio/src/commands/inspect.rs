@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 use toile_capture::inspect;
+use toile_pipeline::{Folders, WornGarment, listed_worn};
 
 use crate::{StudioError, commands::reach::must_exist, outcome::Answer, session::Session};
 
@@ -36,6 +37,15 @@ impl Inspect {
             let problems = take.problems.iter().map(|p| format!("{}: {p}", take.name));
             if take.data_lost() { lost.extend(problems) } else { warnings.extend(problems) }
         }
-        Ok(Answer { text: format!("{found}\n"), results: json!(found), warnings, lost, ..Answer::default() })
+        let mut text = format!("{found}\n");
+        let mut results = json!(found);
+        if found.subject.is_some() {
+            let worn = listed_worn(&Folders::new(&self.path))?;
+            worn.iter().for_each(|w| text += &format!("worn without a scan: {}, from {}\n", w.label, w.file.source));
+            let of =
+                |w: &WornGarment| json!({ "layer": w.label, "source": w.file.source, "type": w.file.garment_type });
+            results["worn"] = worn.iter().map(of).collect();
+        }
+        Ok(Answer { text, results, warnings, lost, ..Answer::default() })
     }
 }

@@ -15,7 +15,7 @@ use toile_pipeline::steps_in;
 use crate::StudioError;
 
 /// Folders of a subject that hold what cannot be built again, and what is built.
-const OF_SUBJECT: [&str; 3] = ["takes", "edits", "build"];
+const OF_SUBJECT: [&str; 4] = ["takes", "worn", "edits", "build"];
 /// The longest name of a file, bytes, with room for what stands behind it while it is written.
 const LONGEST_NAME: usize = 255 - ".63.part".len();
 

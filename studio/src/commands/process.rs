@@ -14,7 +14,10 @@ use toile_pipeline::{FusionChoice, Goal, Options, Summary, process as process_su
 
 use crate::{
     StudioError,
-    commands::{prior::PriorChoice, reach::motion_choice, springs::SpringsChoice, texture_size::TextureSize},
+    commands::{
+        cloth::ClothOptions, prior::PriorChoice, reach::motion_choice, springs::SpringsChoice,
+        texture_size::TextureSize,
+    },
     outcome::{Answer, error_document},
     session::Session,
 };
@@ -51,6 +54,8 @@ pub struct Process {
     /// Whether skirts, dresses and coats swing by spring bones in avatar.vrm (without: as the avatar was made last; on the first time)
     #[arg(long, value_enum)]
     springs: Option<SpringsChoice>,
+    #[command(flatten)]
+    cloth: ClothOptions,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
@@ -75,6 +80,8 @@ impl Process {
             dressed: self.dressed,
             springs: self.springs.map(Into::into),
             texture: self.texture.map(Into::into),
+            generic: self.cloth.generic(),
+            part: self.cloth.part(),
             ..Options::default()
         };
         process(&self.subjects, &options, session)
