@@ -2,6 +2,22 @@
 
 use nalgebra::{Point2, Point3};
 
+/// An inner corner of a board in a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    /// Its number on the board, row by row as [`Board::corners`] has them.
+    pub id: usize,
+    /// Where it is seen, pixels.
+    pub at: Point2<f64>,
+}
+
+impl Corner {
+    /// All corners of a board, in their order.
+    pub fn all(seen: Vec<Point2<f64>>) -> Vec<Self> {
+        seen.into_iter().enumerate().map(|(id, at)| Self { id, at }).collect()
+    }
+}
+
 /// A chessboard: its inner corners, where four squares meet. A board whose columns and rows are one odd and one even has
 /// a first corner; others look the same after half a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]

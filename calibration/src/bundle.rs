@@ -1,9 +1,11 @@
 //! Cameras, their places and the boards' places refined together, so that every corner falls where it was seen
 //! (Levenberg–Marquardt on the distances in the pictures).
 
-use nalgebra::{DMatrix, DVector, Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rayon::prelude::*;
 use toile_geometry::{Rigid, camera::PinholeCamera, statistics::median};
+
+use crate::board::Corner;
 
 /// Steps at most, and the relative gain at which they end.
 const STEPS: usize = 60;
@@ -33,7 +35,7 @@ pub(crate) struct Unknown {
 pub(crate) struct Seen {
     pub camera: usize,
     pub moment: usize,
-    pub corners: Vec<Point2<f64>>,
+    pub corners: Vec<Corner>,
 }
 
 /// Everything that is refined. The first camera is the rig's frame.
@@ -84,11 +86,12 @@ impl Bundle<'_> {
     fn residuals(&self, seen: &Seen) -> Vec<Vector2<f64>> {
         let camera = &self.cameras[seen.camera];
         let camera_from_board = camera.camera_from_rig * self.boards[seen.moment];
-        let residual = |(p, q): (&Point3<f64>, &Point2<f64>)| {
+        let residual = |corner: &Corner| {
+            let pixel = camera.lens.project(&(camera_from_board * self.points[corner.id]));
             // A board that came behind the camera is far off.
-            camera.lens.project(&(camera_from_board * p)).map_or_else(|| Vector2::repeat(1e4), |pixel| pixel - q)
+            pixel.map_or_else(|| Vector2::repeat(1e4), |pixel| pixel - corner.at)
         };
-        self.points.iter().zip(&seen.corners).map(residual).collect()
+        seen.corners.iter().map(residual).collect()
     }
 
     /// Robust standard deviation of the distances, pixels.

@@ -5,13 +5,13 @@
 pub enum CalibrationError {
     /// A camera sees the board too seldom.
     #[error(
-        "camera `{camera}` sees the whole board in {views} pictures; {least} at least are needed, in different places and \
+        "camera `{camera}` sees the board in {views} pictures; {least} at least are needed, in different places and \
          tilted by 20 to 45 degrees each way"
     )]
     TooFewViews {
         /// Its name.
         camera: String,
-        /// Pictures with the whole board.
+        /// Pictures with the board, all of it where it has no markers.
         views: usize,
         /// The number that is needed.
         least: usize,

@@ -11,19 +11,20 @@ use crate::{
 };
 
 /// Blurs that are tried, pixels: sharp pictures first, then noisy and large ones.
-const BLURS: [f64; 3] = [1.5, 2.5, 4.0];
+pub(crate) const BLURS: [f64; 3] = [1.5, 2.5, 4.0];
 /// Corners from which a grid is grown at most, for each blur.
 const SEEDS: usize = 60;
 /// A neighbour lies within this share of a step from where it is expected.
 const ASIDE: f64 = 0.3;
-/// The first neighbours lie within this angle of an edge (cosine of 18°), at most so many pixels away.
+/// The first neighbours lie within this angle of an edge (cosine of 18°), at most so many shares of the width away.
 const ALONG: f64 = 0.95;
 const FARTHEST: f64 = 0.34;
 /// Window of the refinement, as a share of a square's shorter edge in the picture, and its limits, pixels.
 const WINDOW: f64 = 0.3;
 const WINDOWS: (f64, f64) = (2.0, 9.0);
 
-type Cell = (i32, i32);
+/// Column and row of a corner in a grid, from the one that it grew from.
+pub(crate) type Cell = (i32, i32);
 
 /// The inner corners of the board in a picture, row by row as [`Board::corners`] has them; `None` where the whole board is
 /// not seen. Where the board has a first corner, it is found; else the first corner is the one nearer to the top left.
@@ -33,7 +34,11 @@ pub fn find_corners(picture: &Grey, board: &Board) -> Option<Vec<Point2<f64>>> {
     }
     BLURS.iter().find_map(|&sigma| {
         let saddles = find_saddles(picture, sigma);
-        let seeds = (0..saddles.len().min(SEEDS)).map(|seed| grow(&saddles, seed, picture.width as f64, board));
+        let grown = |seed: usize| {
+            let steps = nearest_steps(&saddles, seed, picture.width as f64)?;
+            grow(&saddles, seed, steps, 4 * board.count())
+        };
+        let seeds = (0..saddles.len().min(SEEDS)).map(grown);
         let cells = seeds.flatten().find_map(|cells| whole_board(&cells, board))?;
         let rough = in_order(picture, &saddles, &cells, board);
         let half = (WINDOW * shortest_edge(&rough, board)).clamp(WINDOWS.0, WINDOWS.1);
@@ -41,19 +46,27 @@ pub fn find_corners(picture: &Grey, board: &Board) -> Option<Vec<Point2<f64>>> {
     })
 }
 
-/// The grid around a seed: cells and their saddles.
-fn grow(saddles: &[Saddle], seed: usize, width: f64, board: &Board) -> Option<BTreeMap<Cell, usize>> {
+/// The steps to the right and down from a seed.
+fn nearest_steps(saddles: &[Saddle], seed: usize, width: f64) -> Option<[Vector2<f64>; 2]> {
     let [first, second] = saddles[seed].edges;
     let mut steps = [first, -first, second, -second].into_iter().map(|d| neighbour_along(saddles, seed, d, width));
     let steps: [Option<Vector2<f64>>; 4] = std::array::from_fn(|_| steps.next().flatten());
-    let across = steps[0].or(steps[1].map(|s| -s))?;
-    let down = steps[2].or(steps[3].map(|s| -s))?;
+    Some([steps[0].or(steps[1].map(|s| -s))?, steps[2].or(steps[3].map(|s| -s))?])
+}
+
+/// The grid around a seed by its first steps: cells and their saddles; `None` where it has more than `most`.
+pub(crate) fn grow(
+    saddles: &[Saddle],
+    seed: usize,
+    first: [Vector2<f64>; 2],
+    most: usize,
+) -> Option<BTreeMap<Cell, usize>> {
     let mut cells = BTreeMap::from([((0, 0), seed)]);
     let mut taken = vec![false; saddles.len()];
     taken[seed] = true;
     let mut edge = vec![(0, 0)];
     while let Some(cell) = edge.pop() {
-        if cells.len() > 4 * board.count() {
+        if cells.len() > most {
             return None;
         }
         for step in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
@@ -61,7 +74,7 @@ fn grow(saddles: &[Saddle], seed: usize, width: f64, board: &Board) -> Option<BT
             if cells.contains_key(&next) {
                 continue;
             }
-            let way = step_at(saddles, &cells, cell, step, [across, down]);
+            let way = step_at(saddles, &cells, cell, step, first);
             let expected = saddles[cells[&cell]].at + way;
             if let Some(found) = nearest(saddles, &taken, &expected, ASIDE * way.norm()) {
                 taken[found] = true;

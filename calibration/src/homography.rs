@@ -42,7 +42,6 @@ fn normaliser(points: &[Point2<f64>]) -> Option<Matrix3<f64>> {
 }
 
 /// A point through a homography.
-#[cfg(test)]
 pub(crate) fn mapped(h: &Matrix3<f64>, p: &Point2<f64>) -> Point2<f64> {
     let q: nalgebra::Vector3<f64> = h * p.to_homogeneous();
     Point2::new(q.x / q.z, q.y / q.z)

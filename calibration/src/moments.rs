@@ -1,8 +1,6 @@
 //! Views of one moment from cameras that nobody synchronised: corners between two pictures are interpolated.
 
-use nalgebra::Point2;
-
-use crate::rig::View;
+use crate::{board::Corner, rig::View};
 
 /// Moments that are used of each camera's pictures at most, evenly over the recording.
 const MOST: usize = 30;
@@ -18,8 +16,8 @@ pub struct Sighting {
     pub camera: usize,
     /// When, by a clock that all cameras have in common, nanoseconds.
     pub time_ns: i64,
-    /// The board's corners, pixels.
-    pub corners: Vec<Point2<f64>>,
+    /// The board's corners that are seen, by their numbers.
+    pub corners: Vec<Corner>,
 }
 
 /// Views of the same moments. Pictures in which the board moves fast are left out.
@@ -47,23 +45,30 @@ pub fn views_of(sightings: &[Sighting], cameras: usize) -> Vec<View> {
     views
 }
 
-/// A camera's corners at a time, where the board was seen before and after and moved little.
-fn corners_at(seen: &[&Sighting], time_ns: i64) -> Option<Vec<Point2<f64>>> {
+/// A camera's corners at a time that were seen before and after it, where the board moved little.
+fn corners_at(seen: &[&Sighting], time_ns: i64) -> Option<Vec<Corner>> {
     let after = seen.partition_point(|s| s.time_ns < time_ns).clamp(1, seen.len().max(2) - 1);
     let (a, b) = (seen.get(after - 1)?, seen.get(after)?);
     let span = b.time_ns - a.time_ns;
     let share = (time_ns - a.time_ns) as f64 / span.max(1) as f64;
-    let moved = a.corners.iter().zip(&b.corners).map(|(p, q)| (q - p).norm()).fold(0.0, f64::max);
-    let is_between = (-0.01..=1.01).contains(&share) && span <= APART_NS && moved <= MOVED;
-    is_between.then(|| a.corners.iter().zip(&b.corners).map(|(p, q)| p + (q - p) * share).collect())
+    let after = |corner: &Corner| {
+        let found = b.corners.binary_search_by_key(&corner.id, |c| c.id).ok()?;
+        Some((*corner, b.corners[found].at - corner.at))
+    };
+    let ways: Vec<_> = a.corners.iter().filter_map(after).collect();
+    let moved = ways.iter().map(|(_, way)| way.norm()).fold(0.0, f64::max);
+    let is_between = (-0.01..=1.01).contains(&share) && span <= APART_NS && moved <= MOVED && !ways.is_empty();
+    is_between.then(|| ways.iter().map(|(corner, way)| Corner { at: corner.at + way * share, ..*corner }).collect())
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Point2;
+
     use super::*;
 
     fn sighting(camera: usize, time_ms: i64, x: f64) -> Sighting {
-        Sighting { camera, time_ns: time_ms * 1_000_000, corners: vec![Point2::new(x, 2.0 * x)] }
+        Sighting { camera, time_ns: time_ms * 1_000_000, corners: Corner::all(vec![Point2::new(x, 2.0 * x)]) }
     }
 
     #[test]
@@ -71,12 +76,19 @@ mod tests {
         let slow = [sighting(0, 0, 0.0), sighting(0, 100, 1.0), sighting(1, 40, 5.0), sighting(1, 140, 6.0)];
         let views = views_of(&slow, 2);
         let at = |camera: usize, moment: usize| {
-            views.iter().find(|v| v.camera == camera && v.moment == moment).map(|v| v.corners[0].x)
+            views.iter().find(|v| v.camera == camera && v.moment == moment).map(|v| v.corners[0].at.x)
         };
         // Camera 0 at 100 ms sees what camera 1 saw between 40 and 140 ms; camera 1 at 40 ms what camera 0 saw before.
         assert_eq!((at(0, 1), at(1, 1)), (Some(1.0), Some(5.6)));
         assert_eq!((at(1, 2), at(0, 2)), (Some(5.0), Some(0.4)));
         assert!(views_of(&[sighting(0, 0, 0.0), sighting(0, 100, 20.0)], 1).is_empty());
         assert!(views_of(&[sighting(0, 0, 0.0)], 1).is_empty());
+        // Another part of a board that is not wholly seen: only what both pictures show is in between.
+        let mut part = [sighting(0, 0, 0.0), sighting(0, 100, 1.0)];
+        part[0].corners.push(Corner { id: 7, at: Point2::new(3.0, 3.0) });
+        part[1].corners.push(Corner { id: 9, at: Point2::new(90.0, 3.0) });
+        assert_eq!(views_of(&part, 1).last().unwrap().corners.len(), 2, "its own");
+        let between = corners_at(&part.iter().collect::<Vec<_>>(), 50_000_000).unwrap();
+        assert_eq!(between, [Corner { id: 0, at: Point2::new(0.5, 1.0) }]);
     }
 }

@@ -10,13 +10,8 @@ const FINE: usize = 4;
 
 /// The board at `camera_from_board` before grey, with noise (standard deviation of brightness 1.5 of 255).
 pub(crate) fn picture(camera: &PinholeCamera, camera_from_board: &Rigid, board: &Board, seed: u64) -> Grey {
-    let (w, h) = (camera.width as usize, camera.height as usize);
-    let board_from_camera = camera_from_board.inverse();
-    let eye = board_from_camera.translation.vector;
-    let value = |u: f64, v: f64| {
-        let ray = board_from_camera.rotation * camera.unproject(u, v, 1.0).coords;
-        let at = (eye - ray * (eye.z / ray.z)) / board.square_m;
-        let (x, y) = (at.x + 1.0, at.y + 1.0);
+    let value = |x: f64, y: f64| {
+        let (x, y) = (x / board.square_m + 1.0, y / board.square_m + 1.0);
         let inside = |m: f64| x > -m && y > -m && x < board.columns as f64 + 1.0 + m && y < board.rows as f64 + 1.0 + m;
         match (inside(0.0), inside(0.7)) {
             (true, _) => {
@@ -29,6 +24,24 @@ pub(crate) fn picture(camera: &PinholeCamera, camera_from_board: &Rigid, board: 
             (false, true) => 225.0,
             _ => 110.0,
         }
+    };
+    picture_of(camera, camera_from_board, seed, value)
+}
+
+/// A plane at `camera_from_plane` whose brightness at x, y (metres) is `bright`, seen with the same noise.
+pub(crate) fn picture_of(
+    camera: &PinholeCamera,
+    camera_from_plane: &Rigid,
+    seed: u64,
+    bright: impl Fn(f64, f64) -> f64 + Sync,
+) -> Grey {
+    let (w, h) = (camera.width as usize, camera.height as usize);
+    let plane_from_camera = camera_from_plane.inverse();
+    let eye = plane_from_camera.translation.vector;
+    let value = |u: f64, v: f64| {
+        let ray = plane_from_camera.rotation * camera.unproject(u, v, 1.0).coords;
+        let at = eye - ray * (eye.z / ray.z);
+        bright(at.x, at.y)
     };
     let pixel = |i: usize| {
         let (x, y) = ((i % w) as f64, (i / w) as f64);

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point2, Point3};
 use toile_geometry::{Rigid, camera::PinholeCamera};
 
 use crate::{
-    board::Board,
+    board::{Board, Corner},
     bundle::{Bundle, Seen, Unknown},
     closed_form::{camera_from_plane, intrinsics},
     error::CalibrationError,
@@ -13,6 +13,8 @@ use crate::{
 
 /// Pictures from which a lens is found at least.
 const LEAST_VIEWS: usize = 4;
+/// Corners that a view has at least.
+const LEAST_CORNERS: usize = 6;
 
 /// The board as one camera saw it.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,8 +23,8 @@ pub struct View {
     pub camera: usize,
     /// Views of one moment show the board in one place.
     pub moment: usize,
-    /// Its corners, pixels, in the order of [`crate::find_corners`].
-    pub corners: Vec<Point2<f64>>,
+    /// The corners that it saw, each once.
+    pub corners: Vec<Corner>,
 }
 
 /// Cameras that were calibrated.
@@ -43,6 +45,8 @@ pub struct CalibratedRig {
 /// Calibrates cameras from views of a board. `names` are the cameras'; a lens that is told stays, one that is not
 /// (`Err` of width and height) is found.
 ///
+/// Views of fewer than six corners, or of corners in one row, are left out: they do not tell where the board is.
+///
 /// # Errors
 /// [`CalibrationError`] names the camera that sees too little.
 pub fn calibrate(
@@ -53,6 +57,8 @@ pub fn calibrate(
 ) -> Result<CalibratedRig, CalibrationError> {
     let points = board.points();
     let plane = board.corners();
+    let views: Vec<View> = views.iter().filter(|view| tells_a_place(view, board)).cloned().collect();
+    let views = &views[..];
     let mut cameras = Vec::new();
     for (c, lens) in lenses.iter().enumerate() {
         let of: Vec<&View> = views.iter().filter(|v| v.camera == c).collect();
@@ -81,6 +87,17 @@ pub fn calibrate(
     })
 }
 
+/// True where a view has enough corners, in two rows and columns at least.
+fn tells_a_place(view: &View, board: &Board) -> bool {
+    let differ = |of: fn(usize, usize) -> usize| {
+        let mut all = view.corners.iter().map(|corner| of(corner.id, board.columns));
+        let first = all.next();
+        all.any(|other| Some(other) != first)
+    };
+    let is_known = view.corners.iter().all(|corner| corner.id < board.count());
+    view.corners.len() >= LEAST_CORNERS && is_known && differ(|id, w| id / w) && differ(|id, w| id % w)
+}
+
 fn seen_of(view: &View) -> Seen {
     Seen { camera: view.camera, moment: view.moment, corners: view.corners.clone() }
 }
@@ -103,7 +120,7 @@ fn alone(
         Err(size) => size,
     };
     let degenerate = || CalibrationError::Degenerate { camera: name.into() };
-    let maps: Vec<Matrix3<f64>> = views.iter().filter_map(|v| homography(plane, &v.corners)).collect();
+    let maps: Vec<Matrix3<f64>> = views.iter().filter_map(|v| map_of(&v.corners, plane, Some)).collect();
     let first = intrinsics(&maps, width, height).ok_or_else(degenerate)?;
     let (mut seen, mut boards) = (Vec::new(), Vec::new());
     for view in views {
@@ -119,11 +136,21 @@ fn alone(
 }
 
 /// Where the board is before a camera.
-fn pose(lens: &PinholeCamera, corners: &[Point2<f64>], plane: &[Point2<f64>]) -> Option<Rigid> {
-    let ideal = PinholeCamera { distortion: [0.0; 5], ..*lens };
-    let straight: Vec<Point2<f64>> =
-        corners.iter().filter_map(|p| ideal.project(&lens.unproject(p.x, p.y, 1.0))).collect();
-    camera_from_plane(&homography(plane, &straight)?, &ideal)
+fn pose(lens: &PinholeCamera, corners: &[Corner], plane: &[Point2<f64>]) -> Option<Rigid> {
+    let ideal = lens.undistorted();
+    let straight = |p: Point2<f64>| ideal.project(&lens.unproject(p.x, p.y, 1.0));
+    camera_from_plane(&map_of(corners, plane, straight)?, &ideal)
+}
+
+/// The map of the board's plane to corners, each as `pixel` changes it.
+fn map_of(
+    corners: &[Corner],
+    plane: &[Point2<f64>],
+    pixel: impl Fn(Point2<f64>) -> Option<Point2<f64>>,
+) -> Option<Matrix3<f64>> {
+    let pairs = corners.iter().filter_map(|corner| Some((plane[corner.id], pixel(corner.at)?)));
+    let (plane, pixels): (Vec<_>, Vec<_>) = pairs.unzip();
+    homography(&plane, &pixels)
 }
 
 /// Places all cameras from boards that two of them see, beginning with the first one.

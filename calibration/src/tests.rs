@@ -5,7 +5,7 @@ use toile_geometry::{Rigid, camera::PinholeCamera};
 use toile_outside::data;
 
 use crate::{
-    Board, CalibrationError, Grey, View, calibrate, find_corners,
+    Board, CalibrationError, Corner, Grey, View, calibrate, find_corners,
     homography::{homography, mapped},
     picture::{normal, picture},
 };
@@ -91,8 +91,8 @@ fn noisy_views(count: u64) -> Vec<View> {
         let moment = k as usize;
         let second = second_from_first() * pose;
         [
-            View { camera: 0, moment, corners: noisy(&pose, 2 * k) },
-            View { camera: 1, moment, corners: noisy(&second, 2 * k + 1) },
+            View { camera: 0, moment, corners: Corner::all(noisy(&pose, 2 * k)) },
+            View { camera: 1, moment, corners: Corner::all(noisy(&second, 2 * k + 1)) },
         ]
     };
     (0..count).flat_map(both).collect()
@@ -123,7 +123,8 @@ fn cameras_that_see_too_little_are_named() {
     let apart: Vec<View> = views.iter().map(|v| View { moment: v.moment + 10 * v.camera, ..v.clone() }).collect();
     let error = calibrate(&names, &[told, told], &apart, &BOARD).unwrap_err();
     assert!(matches!(error, CalibrationError::NotConnected { ref camera } if camera == "b"), "{error}");
-    let flat: Vec<View> = (0..6).map(|k| View { camera: 0, moment: k, corners: BOARD.corners() }).collect();
+    let flat: Vec<View> =
+        (0..6).map(|k| View { camera: 0, moment: k, corners: Corner::all(BOARD.corners()) }).collect();
     let error = calibrate(&names[..1], &[Err((640, 480))], &flat, &BOARD).unwrap_err();
     assert!(matches!(error, CalibrationError::Degenerate { .. }), "{error}");
 }
@@ -142,7 +143,7 @@ fn real_pairs_give_what_opencv_finds() {
             let grey = Grey::new(image.width() as usize, image.height() as usize, values);
             let found = find_corners(&grey, &board);
             let corners = found.unwrap_or_else(|| panic!("{side}{k:02}: the whole board is seen"));
-            views.push(View { camera, moment: k, corners });
+            views.push(View { camera, moment: k, corners: Corner::all(corners) });
         }
     }
     let names = ["left".to_string(), "right".to_string()];

@@ -3,8 +3,8 @@
 use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
 
-/// A pinhole camera with optional Brown–Conrady lens distortion. Camera frame: +X right, +Y down, +Z forward;
-/// pixel centres at integers.
+/// A pinhole camera with optional Brown–Conrady lens distortion, rational where that is given. Camera frame: +X right, +Y down,
+/// +Z forward; pixel centres at integers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PinholeCamera {
     /// Image width, pixels.
@@ -22,12 +22,31 @@ pub struct PinholeCamera {
     /// Brown–Conrady coefficients k1 k2 p1 p2 k3 (OpenCV's order); all zero for an ideal lens.
     #[serde(default)]
     pub distortion: [f64; 5],
+    /// The rational lens' k4 k5 k6 (OpenCV's order): the radial polynomial 1 + k1 r² + k2 r⁴ + k3 r⁶ is divided by
+    /// 1 + k4 r² + k5 r⁴ + k6 r⁶. All zero for every other lens.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub rational: [f64; 3],
+}
+
+/// Steps of the inverse of the lens at most: a polynomial one converges for the lenses of depth cameras in a few steps, a
+/// rational one, which lenses of 120 degrees need, more slowly.
+const STEPS: usize = 20;
+const RATIONAL_STEPS: usize = 400;
+
+fn is_zero(coefficients: &[f64; 3]) -> bool {
+    coefficients.iter().all(|k| *k == 0.0)
 }
 
 impl PinholeCamera {
     /// An ideal pinhole camera.
     pub fn ideal(width: u32, height: u32, fx: f64, fy: f64, cx: f64, cy: f64) -> Self {
-        Self { width, height, fx, fy, cx, cy, distortion: [0.0; 5] }
+        Self { width, height, fx, fy, cx, cy, distortion: [0.0; 5], rational: [0.0; 3] }
+    }
+
+    /// The ideal camera of the same size, focal lengths and principal point.
+    #[must_use]
+    pub fn undistorted(&self) -> Self {
+        Self::ideal(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
     }
 
     /// True when every number is finite, the image has pixels and the focal lengths are positive.
@@ -37,12 +56,12 @@ impl PinholeCamera {
             && self.height > 0
             && self.fx > 0.0
             && self.fy > 0.0
-            && numbers.iter().chain(&self.distortion).all(|x| x.is_finite())
+            && numbers.iter().chain(&self.distortion).chain(&self.rational).all(|x| x.is_finite())
     }
 
     /// True when the lens bends rays.
     pub fn is_distorted(&self) -> bool {
-        self.distortion.iter().any(|&k| k != 0.0)
+        self.distortion.iter().chain(&self.rational).any(|&k| k != 0.0)
     }
 
     /// Pixel of a point in the camera frame; `None` at or behind the camera plane.
@@ -75,20 +94,24 @@ impl PinholeCamera {
     fn distort(&self, x: f64, y: f64) -> (f64, f64) {
         let [k1, k2, p1, p2, k3] = self.distortion;
         let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let mut radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        if !is_zero(&self.rational) {
+            let [k4, k5, k6] = self.rational;
+            radial /= 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
+        }
         (
             x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
             y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
         )
     }
 
-    /// Fixed-point inverse of [`Self::distort`]; converges for the lenses of depth cameras in a few steps, and stops there.
+    /// Fixed-point inverse of [`Self::distort`], which stops where it has converged.
     fn undistort(&self, xd: f64, yd: f64) -> (f64, f64) {
         if !self.is_distorted() {
             return (xd, yd);
         }
         let (mut x, mut y) = (xd, yd);
-        for _ in 0..20 {
+        for _ in 0..if is_zero(&self.rational) { STEPS } else { RATIONAL_STEPS } {
             let (dx, dy) = self.distort(x, y);
             let next = (x + (xd - dx), y + (yd - dy));
             if next == (x, y) {
@@ -113,5 +136,21 @@ mod tests {
             let q = camera.project(&p).expect("in front of the camera");
             assert!((q.x - u).abs() < 1e-6 && (q.y - v).abs() < 1e-6, "{u} {v} came back as {q}");
         }
+    }
+
+    /// The lens of a time-of-flight camera of 120 degrees, whose polynomials nearly cancel.
+    #[test]
+    fn a_rational_lens_inverts_to_the_rim() {
+        let mut camera = PinholeCamera::ideal(1024, 1024, 504.3, 504.4, 513.0, 515.0);
+        (camera.distortion, camera.rational) = ([6.084, 4.375, 6.5e-5, -5.5e-5, 0.2362], [6.409, 6.418, 1.220]);
+        // r² = 1: the radial factor is (1 + k1 + k2 + k3) / (1 + k4 + k5 + k6).
+        let seen = camera.project(&Point3::new(1.0, 0.0, 1.0)).unwrap();
+        let radial = (1.0 + 6.084 + 4.375 + 0.2362) / (1.0 + 6.409 + 6.418 + 1.220);
+        assert!((seen.x - (504.3 * (radial - 5.5e-5 * 3.0) + 513.0)).abs() < 1e-9, "{seen}");
+        for (u, v) in [(513.0, 515.0), (20.0, 515.0), (160.0, 170.0), (900.0, 830.0)] {
+            let q = camera.project(&camera.unproject(u, v, 2.0)).expect("in front of the camera");
+            assert!((q.x - u).abs() < 1e-3 && (q.y - v).abs() < 1e-3, "{u} {v} came back as {q}");
+        }
+        assert!(camera.is_distorted() && !camera.undistorted().is_distorted());
     }
 }

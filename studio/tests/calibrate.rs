@@ -92,7 +92,9 @@ fn what_cannot_be_calibrated_is_refused() {
         exits(code, &mut command).to_string()
     };
     assert!(said(&[], 1).contains("has one sensor"));
-    assert!(said(&["--board", "9x6,80"], 1).contains("sees the whole board in 0 pictures"));
+    assert!(said(&["--board", "9x6,80"], 1).contains("sees the board in 0 pictures"));
+    assert!(said(&["--board", "7x10,80,60,DICT_5X5_100"], 1).contains("sees the board in 0 pictures"));
+    assert!(said(&["--board", "7x10,80,60,DICT_9X9_100"], 2).contains("is no dictionary"));
     assert!(said(&["--board", "9"], 2).contains("is no board"));
     exits(2, toile().arg("calibrate").arg(&rig));
     assert_eq!(fs::read_to_string(&rig).unwrap(), RIG);

@@ -143,8 +143,7 @@ struct Depth {
 impl Depth {
     fn new(shot: &Shot, mesh: &Mesh) -> Self {
         let (step, camera) = (STEP as f64, shot.camera);
-        let mut lens = camera;
-        lens.distortion = [0.0; 5];
+        let mut lens = camera.undistorted();
         lens.width = shot.width.div_ceil(STEP) as u32;
         lens.height = shot.height.div_ceil(STEP) as u32;
         (lens.fx, lens.fy) = (camera.fx / step, camera.fy / step);

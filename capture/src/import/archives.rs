@@ -104,14 +104,7 @@ fn dumps_of_libfreenect_are_disparities_or_millimetres() {
 #[test]
 fn files_that_are_not_read_are_named_with_what_to_do() {
     let dir = tempfile::tempdir().unwrap();
-    for (name, bytes, word) in [
-        ("a.oni", &b"NI10\0\0"[..], "OpenNI"),
-        ("a.db3", b"SQLite format 3\0", "ros2 bag convert"),
-        ("a.mkv", b"\x1a\x45\xdf\xa3", "Matroska"),
-        ("a.zip", b"PK\x03\x04", "unpack it"),
-    ] {
-        let path = dir.path().join(name);
-        fs::write(&path, bytes).unwrap();
-        assert!(guess(&path).unwrap_err().to_string().contains(word), "{name}");
-    }
+    let path = dir.path().join("a.zip");
+    fs::write(&path, b"PK\x03\x04").unwrap();
+    assert!(guess(&path).unwrap_err().to_string().contains("unpack it"));
 }

@@ -1,7 +1,7 @@
 //! Calibration files: `camera.json` and its relatives.
 //!
 //! Read are: `width`, `height`, `fx`, `fy`, `cx`, `cy` (or `intrinsic_matrix`, 9 numbers column by column as Open3D
-//! writes them, or row by row); optional `distortion` (k1 k2 p1 p2 k3), `depth_scale` (metres a unit, or units a metre where it is 1 or more), `fps`;
+//! writes them, or row by row); optional `distortion` (k1 k2 p1 p2 k3, and k4 k5 k6 of a rational lens), `depth_scale` (metres a unit, or units a metre where it is 1 or more), `fps`;
 //! optional `color` (the same fields, of a colour camera that is not registered to depth) with `color_from_depth`
 //! (4×4, 16 numbers row by row, metres).
 
@@ -184,16 +184,25 @@ fn parse_camera(object: &Map<String, Value>, prefix: &str) -> Result<PinholeCame
         let reason = format!("and `{prefix}height` give {width} x {height} pixels, which are too many");
         return Err(Fault::at(prefix, "width", reason));
     }
-    let distortion: [f64; 5] = match object.get("distortion") {
-        None | Some(Value::Null) => [0.0; 5],
-        Some(list) => numbers(list)
-            .ok_or_else(|| Fault::at(prefix, "distortion", "must be a list of 5 numbers: k1 k2 p1 p2 k3"))?,
-    };
-    if let Some(wild) = distortion.iter().find(|k| k.abs() > MAX_DISTORTION) {
+    let (distortion, rational) = lens(object, prefix)?;
+    if let Some(wild) = distortion.iter().chain(&rational).find(|k| k.abs() > MAX_DISTORTION) {
         let reason = format!("has {wild}; no lens bends more than {MAX_DISTORTION}");
         return Err(Fault::at(prefix, "distortion", reason));
     }
-    Ok(PinholeCamera { distortion, ..PinholeCamera::ideal(width, height, fx, fy, cx, cy) })
+    Ok(PinholeCamera { distortion, rational, ..PinholeCamera::ideal(width, height, fx, fy, cx, cy) })
+}
+
+/// k1 k2 p1 p2 k3, and k4 k5 k6 where the list has eight numbers.
+fn lens(object: &Map<String, Value>, prefix: &str) -> Result<([f64; 5], [f64; 3]), Fault> {
+    let Some(list) = object.get("distortion").filter(|value| !value.is_null()) else { return Ok(Default::default()) };
+    if let Some([k1, k2, p1, p2, k3, rational @ ..]) = numbers::<8>(list) {
+        return Ok(([k1, k2, p1, p2, k3], rational));
+    }
+    let wrong = || {
+        let reason = "must be a list of 5 numbers, k1 k2 p1 p2 k3, or of 8: those and k4 k5 k6 of a rational lens";
+        Fault::at(prefix, "distortion", reason)
+    };
+    numbers(list).map(|five| (five, [0.0; 3])).ok_or_else(wrong)
 }
 
 fn pixels(object: &Map<String, Value>, prefix: &str, name: &str) -> Result<u32, Fault> {

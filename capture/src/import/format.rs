@@ -31,11 +31,17 @@ pub enum Format {
     Bag,
     /// An MCAP file with messages of ROS 1 or ROS 2.
     RosMcap,
+    /// A ROS 2 bag: its folder, or one SQLite file of it.
+    Ros2Bag,
+    /// OpenNI.
+    Oni,
+    /// Matroska as k4arecorder writes it.
+    Mkv,
 }
 
 impl Format {
     /// Every format, in the order in which they are listed to people.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 16] = [
         Self::ToileFolder,
         Self::Tum,
         Self::Uva,
@@ -46,9 +52,12 @@ impl Format {
         Self::Freenect,
         Self::Record3d,
         Self::Sens,
+        Self::Mkv,
+        Self::Oni,
         Self::Mcap,
         Self::Bag,
         Self::RosMcap,
+        Self::Ros2Bag,
     ];
 
     /// The name on the command line.
@@ -65,8 +74,11 @@ impl Format {
             Self::Freenect => "freenect",
             Self::Record3d => "record3d",
             Self::Sens => "sens",
+            Self::Mkv => "mkv",
+            Self::Oni => "oni",
             Self::Bag => "bag",
             Self::RosMcap => "ros-mcap",
+            Self::Ros2Bag => "ros2-bag",
         }
     }
 }

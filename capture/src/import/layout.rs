@@ -7,7 +7,7 @@ use super::{
     format::{Format, names},
     freenect,
     inventory::{Entry, FolderSource, Listing},
-    record3d, redwood, ros, sens, seven_scenes, sniff, stray, tum, uva,
+    matroska, oni, record3d, redwood, ros, sens, seven_scenes, sniff, stray, tum, uva,
 };
 use crate::{CaptureError, Replay, Source, printable};
 
@@ -41,7 +41,10 @@ pub fn open_with(path: &Path, options: &ImportOptions) -> Result<Box<dyn Source>
     Ok(match format {
         Format::Mcap => Box::new(Replay::open(path)?),
         Format::Bag => Box::new(ros::open_bag(path)?),
+        Format::Ros2Bag => Box::new(ros::open_bag2(path)?),
         Format::RosMcap => Box::new(ros::open_mcap(path)?),
+        Format::Oni => Box::new(oni::open(path)?),
+        Format::Mkv => Box::new(matroska::open(path)?),
         Format::Sens => Box::new(sens::open(path)?),
         Format::Record3d => Box::new(record3d::open(path)?),
         Format::Freenect => Box::new(freenect::open(path, &Listing::read(path)?)?),
@@ -55,7 +58,7 @@ pub fn open_with(path: &Path, options: &ImportOptions) -> Result<Box<dyn Source>
 /// As [`open`].
 pub fn files(path: &Path) -> Result<Vec<PathBuf>, CaptureError> {
     let format = guess(path)?;
-    if matches!(format, Format::Record3d | Format::Freenect) {
+    if matches!(format, Format::Record3d | Format::Freenect | Format::Ros2Bag) {
         return all_files(path);
     }
     let source = open_folder(path, format, false)?;
@@ -106,6 +109,8 @@ fn guess_listing(path: &Path, listing: &Listing) -> Option<Format> {
         Some(Format::Freenect)
     } else if any(&|name| name == "metadata") && listing.folders.iter().any(|name| name == "rgbd") {
         Some(Format::Record3d)
+    } else if ros::holds_bag2(listing) {
+        Some(Format::Ros2Bag)
     } else if redwood::is_named_so(path) {
         Some(Format::Redwood)
     } else if listing.folders.iter().any(|name| name == "depth") {

@@ -12,8 +12,11 @@
 //! | `freenect` | `INDEX.txt`, `d-TIME-STAMP.pgm`, `r-TIME-STAMP.ppm` |
 //! | `record3d` | an `.r3d` archive, or `metadata` and `rgbd/N.depth`, `rgbd/N.jpg` |
 //! | `sens` | BundleFusion and ScanNet |
+//! | `mkv` | Matroska of k4arecorder and of what records as it does |
+//! | `oni` | OpenNI 1 and 2 |
 //! | `bag` | a ROS 1 bag with `sensor_msgs`, as librealsense records, too |
 //! | `ros-mcap` | MCAP with `sensor_msgs` of ROS 1 or ROS 2 |
+//! | `ros2-bag` | the folder of a ROS 2 bag (SQLite or MCAP), or one `.db3` of it |
 //! | `mcap` | a recording of Toile's own, or of another program with Foxglove's messages |
 //!
 //! Nothing but names and calibration is read on opening; each frame is read when it is asked for. Frames pair by their
@@ -38,7 +41,9 @@ mod freenect;
 mod images;
 mod inventory;
 mod layout;
+mod matroska;
 mod number_list;
+mod oni;
 mod poses;
 mod record;
 mod record3d;
@@ -70,6 +75,8 @@ pub(crate) fn parse_calibration(text: &str) {
 pub(crate) fn parse_recording(bytes: &[u8]) {
     ros::parse(bytes);
     sens::parse(bytes);
+    matroska::parse(bytes);
+    oni::parse(bytes);
     zip::parse(bytes);
     record3d::parse(bytes);
     freenect::parse(bytes);

@@ -54,6 +54,25 @@ pub(super) fn shots(depth_ns: &[i64], color_ns: &[i64]) -> Vec<Shot> {
     all.into_iter().enumerate().map(shot).collect()
 }
 
+/// Frames with numbers that count the missing ones, too, and how many are missing before each.
+pub(super) fn numbered(mut shots: Vec<Shot>, period_ns: i64) -> (Vec<Shot>, Vec<u32>) {
+    let (mut number, mut before, mut missing) = (0, None, Vec::new());
+    for shot in &mut shots {
+        let steps = match before {
+            Some(before) if period_ns > 0 => {
+                let steps = shot.time_ns.saturating_sub(before) as f64 / period_ns as f64;
+                steps.round().clamp(1.0, f64::from(u32::MAX)) as u32
+            }
+            Some(_) => 1,
+            None => 0,
+        };
+        number += u64::from(steps);
+        missing.push(steps.saturating_sub(1));
+        (shot.number, before) = (number, Some(shot.time_ns));
+    }
+    (shots, missing)
+}
+
 /// The median step of times in their order; `None` where they do not rise.
 fn median_step(times: &[i64]) -> Option<i64> {
     let mut steps: Vec<i64> = times.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
@@ -76,6 +95,8 @@ pub(super) struct StoredSource {
     album: Box<dyn Album>,
     next: usize,
     remarks: Vec<String>,
+    /// How many frames are missing before each; empty where that is not known.
+    missing: Vec<u32>,
 }
 
 impl StoredSource {
@@ -93,7 +114,12 @@ impl StoredSource {
         if !shots.iter().any(|shot| shot.depth.is_some()) {
             return Err(CaptureError::format(&path, "there is no depth picture in it"));
         }
-        Ok(Self { path, rig, shots, album, next: 0, remarks })
+        Ok(Self { path, rig, shots, album, next: 0, remarks, missing: Vec::new() })
+    }
+
+    /// The same with the number of frames that are missing before each.
+    pub(super) fn missing(self, missing: Vec<u32>) -> Self {
+        Self { missing, ..self }
     }
 
     fn load(&mut self, index: usize) -> Result<Frame, CaptureError> {
@@ -117,7 +143,7 @@ impl StoredSource {
             sensor: 0,
             index: index as u64,
             device_frame: shot.number,
-            lost_before: 0,
+            lost_before: self.missing.get(index).copied().unwrap_or(0),
             device_time_ns: shot.time_ns,
             host_time_ns: shot.time_ns,
             depth: depth.map(Arc::new),

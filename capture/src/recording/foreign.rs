@@ -92,7 +92,10 @@ impl Survey {
         let topic = || format!("a message of the topic `{}`", self.channels[&id].topic);
         if location.schema == Schema::CameraCalibration {
             let calibration = decode_calibration(data).ok_or_else(|| {
-                format!("{} is not the calibration of a pinhole camera with at most five distortion terms", topic())
+                format!(
+                    "{} is not the calibration of a pinhole camera with five distortion terms, or the eight of a rational lens",
+                    topic()
+                )
             })?;
             self.calibrations.entry(id).or_insert(calibration);
             return Ok(());

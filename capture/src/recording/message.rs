@@ -90,13 +90,18 @@ pub(super) fn encode_calibration(camera: &PinholeCamera, frame_id: &str, time_ns
     let p = [camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0];
     let mut writer = Writer::default();
     writer.bytes(1, &timestamp(time_ns)).fixed32(2, camera.width).fixed32(3, camera.height);
-    writer.string(4, "plumb_bob").doubles(5, &camera.distortion);
+    if camera.rational == [0.0; 3] {
+        writer.string(4, "plumb_bob").doubles(5, &camera.distortion);
+    } else {
+        let all: Vec<f64> = camera.distortion.iter().chain(&camera.rational).copied().collect();
+        writer.string(4, "rational_polynomial").doubles(5, &all);
+    }
     writer.doubles(6, &k).doubles(7, &r).doubles(8, &p).string(9, frame_id);
     writer.bytes
 }
 
 /// A camera and its `frame_id` from a `foxglove.CameraCalibration` message; `None` where the bytes are not one, or the
-/// camera is not a pinhole camera with the usual five distortion terms.
+/// camera is not a pinhole camera with the usual five distortion terms, or eight of a rational lens.
 pub(super) fn decode_calibration(bytes: &[u8]) -> Option<(PinholeCamera, String)> {
     let (mut width, mut height, mut frame_id) = (0, 0, "");
     let (mut distortion, mut k) = (Vec::new(), Vec::new());
@@ -112,14 +117,14 @@ pub(super) fn decode_calibration(bytes: &[u8]) -> Option<(PinholeCamera, String)
     }
     let k: [f64; 9] = k.try_into().ok()?;
     let mut camera = PinholeCamera::ideal(width, height, k[0], k[4], k[2], k[5]);
-    match distortion.as_slice() {
-        [] => {}
-        [four @ .., _] if distortion.len() == 5 => {
-            camera.distortion[..4].copy_from_slice(four);
-            camera.distortion[4] = distortion[4];
+    match distortion.len() {
+        0 => {}
+        4 | 5 => camera.distortion[..distortion.len()].copy_from_slice(&distortion),
+        8 => {
+            camera.distortion.copy_from_slice(&distortion[..5]);
+            camera.rational.copy_from_slice(&distortion[5..]);
         }
-        four if four.len() == 4 => camera.distortion[..4].copy_from_slice(four),
-        others if others.iter().all(|x| *x == 0.0) => {}
+        _ if distortion.iter().all(|x| *x == 0.0) => {}
         _ => return None,
     }
     camera.is_valid().then(|| (camera, frame_id.to_string()))
@@ -236,11 +241,14 @@ mod tests {
             distortion: [0.1, -0.2, 0.001, 0.002, 0.05],
             ..PinholeCamera::ideal(64, 48, 60.0, 61.0, 31.5, 23.5)
         };
-        let bytes = encode_calibration(&camera, "front", 5);
-        assert_eq!(decode_calibration(&bytes), Some((camera, "front".to_string())));
-        for length in 0..bytes.len() {
-            let found = decode_calibration(&bytes[..length]);
-            assert!(found.is_none_or(|(found, _)| found == camera), "{length} bytes are another camera");
+        let rational = PinholeCamera { rational: [0.3, 0.2, 0.1], ..camera };
+        for camera in [camera, rational] {
+            let bytes = encode_calibration(&camera, "front", 5);
+            assert_eq!(decode_calibration(&bytes), Some((camera, "front".to_string())));
+            for length in 0..bytes.len() {
+                let found = decode_calibration(&bytes[..length]);
+                assert!(found.is_none_or(|(found, _)| found == camera), "{length} bytes are another camera");
+            }
         }
     }
 }

@@ -36,8 +36,7 @@ struct Source {
 impl Rectifier {
     /// For a sensor; depth beyond `max_depth` metres counts as missing.
     pub fn new(sensor: &Sensor, max_depth: f64) -> Self {
-        let mut camera = sensor.depth;
-        camera.distortion = [0.0; 5];
+        let camera = sensor.depth.undistorted();
         let distorted = sensor.depth.is_distorted();
         let map =
             if distorted { camera.rays().into_iter().map(|r| source(&sensor.depth, r)).collect() } else { vec![] };

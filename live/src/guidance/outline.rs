@@ -51,7 +51,7 @@ impl Outline {
     /// The subject in `volume` before `sensor`; `None` where nobody is there. The lens's distortion is passed over: it moves
     /// points by less than a cell.
     pub fn new(sensor: &Sensor, depth: &DepthImage, volume: &SubjectVolume) -> Option<Self> {
-        let camera = PinholeCamera { distortion: [0.0; 5], ..sensor.depth };
+        let camera = sensor.depth.undistorted();
         if depth.width != camera.width || depth.height != camera.height {
             return None;
         }

@@ -16,15 +16,19 @@ FILE is the rig file that `toile capture --rig` reads; position and rotation of 
 TAKE is a recording with that rig. Without --board, a person (or anything that is no column) turns once before all cameras. With
 --board, a chessboard is held before two and more cameras at a time, still, in 15 and more places, tilted each way; the colour
 cameras must see it. COLUMNSxROWS counts inner corners; let one be odd and one even, so that the board has a first corner.
+A ChArUco board is named by its squares across and down, the millimetres of a square and of a marker, and the dictionary
+(DICT_4X4, DICT_5X5, DICT_6X6 with _50, _100, _250 or _1000). Its corners have numbers, so that a part of it is enough. Boards with an
+even number of rows and white in the first corner, as OpenCV made them before 4.6, end with `,legacy`.
 
 With --left and --right, FILE is written for a stereo rig, as OpenCV writes it; lengths in it are metres (metres_per_unit = 1).
 
 Examples:
   toile calibrate rig.toml --take anna/takes/00-body.mcap
   toile calibrate rig.toml --take board.mcap --board 9x6,80
+  toile calibrate rig.toml --take board.mcap --board 7x10,80,60,DICT_5X5_100
   toile calibrate stereo.yml --board 9x6,25 --left left*.png --right right*.png";
 
-/// Find where the cameras of a rig stand, from a person who turns or from a chessboard
+/// Find where the cameras of a rig stand, from a person who turns, a chessboard or a ChArUco board
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Calibrate {
@@ -33,8 +37,9 @@ pub struct Calibrate {
     /// A recording with the rig
     #[arg(long, value_name = "TAKE", conflicts_with_all = ["left", "right"], required_unless_present = "left")]
     take: Option<PathBuf>,
-    /// The chessboard: inner corners along both sides, and the edge of a square in millimetres
-    #[arg(long, value_name = "COLUMNSxROWS,MM")]
+    /// The chessboard: inner corners along both sides, and the edge of a square in millimetres; or the ChArUco board: squares
+    /// along both sides, the edges of a square and of a marker in millimetres, and the dictionary
+    #[arg(long, value_name = "COLUMNSxROWS,MM[,MM,DICTIONARY[,legacy]]")]
     board: Option<BoardChoice>,
     /// Find the colour cameras' lenses too, instead of taking those of the recording
     #[arg(long, requires_all = ["board", "take"])]

@@ -1,4 +1,4 @@
-//! Cameras by a chessboard: rigs from a recording, stereo pairs from pictures.
+//! Cameras by a chessboard or a ChArUco board: rigs from a recording, stereo pairs from pictures.
 
 use std::{
     fmt::Write,
@@ -8,7 +8,8 @@ use std::{
 
 use serde_json::json;
 use toile_calibration::{
-    Board, CalibratedRig, CalibrationError, Grey, Sighting, View, calibrate, find_corners, views_of,
+    Board, CalibratedRig, CalibrationError, Charuco, Corner, Dictionary, Grey, Sighting, View, calibrate, find_charuco,
+    find_corners, views_of,
 };
 use toile_capture::{
     ColorImage, Frame, Replay, RgbImage, Sensor, Source, atomic_write, files::read_bytes, printable_path,
@@ -21,23 +22,83 @@ use crate::{StudioError, outcome::Answer};
 /// Pictures of a recording that are looked at, for each camera, at most.
 const MOST: usize = 400;
 
-/// A board as the command line names it: `9x6,25`.
+/// A board as the command line names it: `9x6,25`, or `5x7,40,30,DICT_4X4_50` with markers.
 #[derive(Debug, Clone, Copy)]
-pub struct BoardChoice(Board);
+pub enum BoardChoice {
+    /// Plain.
+    Chessboard(Board),
+    /// With markers.
+    Charuco(Charuco),
+}
 
 impl FromStr for BoardChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no board; write inner corners and millimetres, such as 9x6,25");
-        let (size, edge) = text.split_once(',').ok_or_else(wrong)?;
+        let wrong = || {
+            format!(
+                "`{text}` is no board; write inner corners and millimetres, such as 9x6,25, or of a ChArUco board squares across and \
+                 down, millimetres of a square and of a marker, and the dictionary, such as 5x7,40,30,DICT_4X4_50"
+            )
+        };
+        let (size, rest) = text.split_once(',').ok_or_else(wrong)?;
         let (a, b) = size.split_once('x').ok_or_else(wrong)?;
         let [a, b] = [a, b].map(|n| n.trim().parse::<usize>().map_err(|_| wrong()));
-        let (a, b, edge) = (a?, b?, edge.trim().parse::<f64>().map_err(|_| wrong())?);
-        if !(3..=50).contains(&a.min(b)) || a.max(b) > 50 || !(edge.is_finite() && edge > 0.0) {
-            return Err(format!("`{text}`: a board has 3 to 50 inner corners along each side, and squares above 0 mm"));
+        let (a, b) = (a?, b?);
+        let length =
+            |word: &str| word.trim().parse::<f64>().ok().filter(|mm| mm.is_finite() && *mm > 0.0).map(|mm| 1e-3 * mm);
+        let too_small =
+            || format!("`{text}`: a board has 3 to 50 inner corners along each side, and squares above 0 mm");
+        let Some((edge, rest)) = rest.split_once(',') else {
+            rest.trim().parse::<f64>().map_err(|_| wrong())?;
+            let square_m =
+                length(rest).filter(|_| (3..=50).contains(&a.min(b)) && a.max(b) <= 50).ok_or_else(too_small)?;
+            return Ok(Self::Chessboard(Board { columns: a.max(b), rows: a.min(b), square_m }));
+        };
+        let (marker, dictionary) = rest.split_once(',').ok_or_else(wrong)?;
+        let (dictionary, is_legacy) =
+            dictionary.strip_suffix(",legacy").map_or((dictionary, false), |name| (name, true));
+        let dictionary: Dictionary = dictionary.trim().parse().map_err(|reason| format!("`{text}`: {reason}"))?;
+        let (square_m, marker_m) = length(edge).zip(length(marker)).ok_or_else(wrong)?;
+        if !(3..=50).contains(&a.min(b)) || a.max(b) > 50 || marker_m >= square_m {
+            return Err(format!(
+                "`{text}`: a ChArUco board has 3 to 50 squares along each side, and markers smaller than its squares"
+            ));
         }
-        Ok(Self(Board { columns: a.max(b), rows: a.min(b), square_m: 1e-3 * edge }))
+        if dictionary.count < (a * b).div_ceil(2) {
+            return Err(format!(
+                "`{text}`: {} markers are too few for {} white squares",
+                dictionary.count,
+                (a * b).div_ceil(2)
+            ));
+        }
+        Ok(Self::Charuco(Charuco { columns: a, rows: b, square_m, marker_m, dictionary, is_legacy }))
+    }
+}
+
+impl BoardChoice {
+    /// Its inner corners.
+    fn board(&self) -> Board {
+        match self {
+            Self::Chessboard(board) => *board,
+            Self::Charuco(charuco) => charuco.board(),
+        }
+    }
+
+    /// The corners that are seen of it in a picture: all of a plain board, some of one with markers.
+    fn find(&self, picture: &Grey) -> Option<Vec<Corner>> {
+        match self {
+            Self::Chessboard(board) => find_corners(picture, board).map(Corner::all),
+            Self::Charuco(charuco) => find_charuco(picture, charuco),
+        }
+    }
+
+    /// True where half a turn of the board can be seen.
+    fn has_a_first_corner(&self) -> bool {
+        match self {
+            Self::Chessboard(board) => board.has_a_first_corner(),
+            Self::Charuco(_) => true,
+        }
     }
 }
 
@@ -55,16 +116,16 @@ pub(super) fn calibrate_take(
             format!("`{}` has no colour camera that could see a board", sensor.name),
         ));
     }
-    if sensors.len() > 1 && !board.0.has_a_first_corner() {
+    if sensors.len() > 1 && !board.has_a_first_corner() {
         let reason = "--board: a board that looks the same after half a turn does not tell cameras apart; use one whose inner \
-                      corners are an odd number along one side and an even one along the other";
+                      corners are an odd number along one side and an even one along the other, or a ChArUco board";
         return Err(StudioError::Usage(reason.into()));
     }
-    let (sightings, looked_at) = sightings(&mut source, sensors.len(), &board.0)?;
+    let (sightings, looked_at) = sightings(&mut source, sensors.len(), board)?;
     let lens = |s: &Sensor| s.color.filter(|_| !find_lenses).ok_or(s.color.map_or((0, 0), |c| (c.width, c.height)));
     let names: Vec<String> = sensors.iter().map(|s| s.name.clone()).collect();
     let lenses: Vec<_> = sensors.iter().map(lens).collect();
-    let rig = calibrate(&names, &lenses, &views_of(&sightings, sensors.len()), &board.0)
+    let rig = calibrate(&names, &lenses, &views_of(&sightings, sensors.len()), &board.board())
         .map_err(|e| refused(take, &e, looked_at))?;
     let first = sensors[0].rig_from_depth * sensors[0].color_from_depth.inverse();
     let place = |(sensor, camera_from_first): (&Sensor, &Rigid)| {
@@ -87,7 +148,7 @@ fn refused(path: &Path, error: &CalibrationError, looked_at: usize) -> StudioErr
 }
 
 /// The boards in a recording's colour pictures by the host's time, and how many pictures were looked at.
-fn sightings(source: &mut Replay, cameras: usize, board: &Board) -> Result<(Vec<Sighting>, usize), StudioError> {
+fn sightings(source: &mut Replay, cameras: usize, board: &BoardChoice) -> Result<(Vec<Sighting>, usize), StudioError> {
     let step = (source.len() as usize).div_ceil(MOST * cameras.max(1)).max(1);
     let (mut found, mut looked_at) = (Vec::new(), 0);
     let mut seen = vec![0; cameras];
@@ -96,7 +157,7 @@ fn sightings(source: &mut Replay, cameras: usize, board: &Board) -> Result<(Vec<
         *count += 1;
         let Some(picture) = picture_of(&frame).filter(|_| (*count - 1) % step == 0) else { continue };
         looked_at += 1;
-        if let Some(corners) = find_corners(&grey(&picture), board) {
+        if let Some(corners) = board.find(&grey(&picture)) {
             found.push(Sighting { camera: frame.sensor, time_ns: frame.host_time_ns, corners });
         }
     }
@@ -130,15 +191,22 @@ pub(super) fn calibrate_pairs(
             if *sizes[camera].get_or_insert(size) != size {
                 return Err(StudioError::refused(path, "has another size than the pictures before it"));
             }
-            match find_corners(&grey(&picture), &board.0) {
+            match board.find(&grey(&picture)) {
                 Some(corners) => views.push(View { camera, moment, corners }),
-                None => missed.push(format!("{}: the whole board is not seen; left out", printable_path(path))),
+                None => {
+                    let what = if matches!(board, BoardChoice::Charuco(_)) {
+                        "two markers of the board are"
+                    } else {
+                        "the whole board is"
+                    };
+                    missed.push(format!("{}: {what} not seen; left out", printable_path(path)));
+                }
             }
         }
     }
     let names = ["left".to_string(), "right".to_string()];
     let lenses: Vec<Result<PinholeCamera, (u32, u32)>> = sizes.iter().map(|s| Err(s.unwrap_or((0, 0)))).collect();
-    let rig = calibrate(&names, &lenses, &views, &board.0).map_err(|e| refused(out, &e, 2 * sides[0].len()))?;
+    let rig = calibrate(&names, &lenses, &views, &board.board()).map_err(|e| refused(out, &e, 2 * sides[0].len()))?;
     atomic_write(out, opencv_yaml(&rig).as_bytes())?;
     let baseline = rig.camera_from_first[1].translation.vector.norm();
     let mut answer =
@@ -199,9 +267,22 @@ mod tests {
 
     #[test]
     fn boards_are_read_and_others_refused() {
-        let BoardChoice(board) = "6x9,25".parse().unwrap();
-        assert_eq!((board.columns, board.rows, board.square_m), (9, 6, 0.025));
-        for (text, words) in [("9x6", "no board"), ("2x6,25", "3 to 50"), ("9x6,0", "above 0"), ("axb,1", "no board")] {
+        let board = |text: &str| text.parse::<BoardChoice>().unwrap();
+        assert!(matches!(board("6x9,25"), BoardChoice::Chessboard(Board { columns: 9, rows: 6, square_m: 0.025 })));
+        let BoardChoice::Charuco(charuco) = board("5x7,40,30,DICT_4X4_50") else { panic!("it has markers") };
+        assert_eq!((charuco.columns, charuco.rows, charuco.square_m, charuco.marker_m), (5, 7, 0.04, 0.03));
+        assert_eq!((charuco.dictionary.squares, charuco.board().count(), charuco.is_legacy), (4, 24, false));
+        assert!(matches!(board("8x6,40,30,5x5_100,legacy"), BoardChoice::Charuco(Charuco { is_legacy: true, .. })));
+        for (text, words) in [
+            ("9x6", "no board"),
+            ("2x6,25", "3 to 50"),
+            ("9x6,0", "above 0"),
+            ("axb,1", "no board"),
+            ("5x7,40,30", "no board"),
+            ("5x7,40,50,4x4_50", "smaller than"),
+            ("12x9,40,30,4x4_50", "too few for 54"),
+            ("5x7,40,30,DICT_7X7_50", "DICT_6X6"),
+        ] {
             assert!(text.parse::<BoardChoice>().unwrap_err().contains(words), "{text}");
         }
     }

@@ -22,7 +22,8 @@ that is worn in it and the last one `body`; `toile reorder SUBJECT --reverse` th
 Where nobody was recorded in underwear, --dressed says so: the body is then estimated under the clothes of the first take.
 Formats, guessed when not said: toile-folder (depth/, color/, camera.json, timestamps.txt; also Open3D's), tum, uva,
 seven-scenes (also 3DMatch), redwood, associated (ICL-NUIM), stray-scanner, freenect (fakenect dumps), record3d (.r3d),
-sens (BundleFusion, ScanNet), bag (ROS 1, librealsense), ros-mcap (ROS 1 and 2), mcap.
+sens (BundleFusion, ScanNet), mkv (k4arecorder), oni (OpenNI), bag (ROS 1, librealsense), ros-mcap (ROS 1 and 2), ros2-bag (its folder, or a
+.db3), mcap.
 
 Finished scans become takes, too: PLY, OBJ, GLB, glTF and STL, with pictures or vertex colours, in any unit, any axis up.
 

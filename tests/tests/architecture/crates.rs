@@ -108,7 +108,7 @@ const ONLY: &[(&str, &[&str])] = &[
     ("nokhwa", &["driver-webcam"]),
     ("mcap", &["capture"]),
     ("gltf-json", &["avatar"]),
-    ("rusqlite", &["archive", "service"]),
+    ("rusqlite", &["archive", "capture", "service"]),
 ];
 
 /// Words that must not stand in a crate's source: crate, words, and which promise of ARCHITECTURE.md that keeps.

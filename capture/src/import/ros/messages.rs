@@ -60,7 +60,8 @@ fn read_camera(reader: &mut Reader) -> Result<(PinholeCamera, String), String> {
         return Err(DAMAGED.into());
     }
     let camera = PinholeCamera::ideal(width, height, k[0], k[4], k[2], k[5]);
-    let camera = PinholeCamera { distortion: brown_conrady(&model, &distortion)?, ..camera };
+    let (distortion, rational) = lens(&model, &distortion)?;
+    let camera = PinholeCamera { distortion, rational, ..camera };
     if camera.is_valid() {
         Ok((camera, frame_id.to_string()))
     } else {
@@ -68,12 +69,13 @@ fn read_camera(reader: &mut Reader) -> Result<(PinholeCamera, String), String> {
     }
 }
 
-/// The five coefficients k1 k2 p1 p2 k3. The model of librealsense that is named "Inverse Brown Conrady" is of depth cameras
-/// whose pictures are rectified: all its coefficients are 0, or it is refused as any other.
-fn brown_conrady(model: &str, coefficients: &[f64]) -> Result<[f64; 5], String> {
+/// The coefficients k1 k2 p1 p2 k3, and k4 k5 k6 of a rational lens. The model of librealsense that is named "Inverse Brown
+/// Conrady" is of depth cameras whose pictures are rectified: all its coefficients are 0, or it is refused as any other.
+fn lens(model: &str, coefficients: &[f64]) -> Result<([f64; 5], [f64; 3]), String> {
     let is_zero = coefficients.iter().all(|c| *c == 0.0);
-    let is_brown = ["", "plumb_bob", "Brown Conrady", "Modified Brown Conrady", "None"].contains(&model);
-    let beyond = coefficients.iter().skip(5).any(|c| *c != 0.0);
+    let is_rational = model == "rational_polynomial";
+    let is_brown = ["", "plumb_bob", "Brown Conrady", "Modified Brown Conrady", "None"].contains(&model) || is_rational;
+    let beyond = coefficients.iter().skip(if is_rational { 8 } else { 5 }).any(|c| *c != 0.0);
     if !is_zero && (beyond || !is_brown) {
         let shown: String = model.chars().filter(|c| !c.is_control()).take(40).collect();
         return Err(format!(
@@ -81,9 +83,9 @@ fn brown_conrady(model: &str, coefficients: &[f64]) -> Result<[f64; 5], String> 
             coefficients.len()
         ));
     }
-    let mut five = [0.0; 5];
-    five.iter_mut().zip(coefficients).for_each(|(to, from)| *to = *from);
-    Ok(five)
+    let (mut five, mut three) = ([0.0; 5], [0.0; 3]);
+    five.iter_mut().chain(&mut three).zip(coefficients).for_each(|(to, from)| *to = *from);
+    Ok((five, three))
 }
 
 /// `geometry_msgs/Transform`.

@@ -5,7 +5,9 @@
 //! whose topic has the most in common. Colour may be a camera of its own where `tf` says where it stands.
 
 mod bag;
+mod bag2;
 mod choice;
+mod db3;
 mod log;
 mod mcap;
 mod messages;
@@ -23,6 +25,8 @@ use log::{Log, Opened};
 use survey::{Stream, Survey};
 
 pub(super) use bag::MAGIC as BAG_MAGIC;
+pub(super) use bag2::is_here as holds_bag2;
+pub(super) use db3::MAGIC as SQLITE_MAGIC;
 pub(super) use mcap::holds_ros;
 
 /// Opens a ROS 1 bag.
@@ -39,6 +43,14 @@ pub(super) fn open_bag(path: &Path) -> Result<StoredSource, CaptureError> {
 /// As [`open_bag`].
 pub(super) fn open_mcap(path: &Path) -> Result<StoredSource, CaptureError> {
     open(path, "ros-mcap", mcap::open(path)?)
+}
+
+/// Opens a ROS 2 bag: its folder, or one file of it in SQLite.
+///
+/// # Errors
+/// As [`open_bag`].
+pub(super) fn open_bag2(path: &Path) -> Result<StoredSource, CaptureError> {
+    open(path, "ros2-bag", bag2::open(path)?)
 }
 
 fn open<L: Log + 'static>(path: &Path, format: &str, opened: Opened<L>) -> Result<StoredSource, CaptureError> {

@@ -271,3 +271,87 @@ fn a_real_recording_of_librealsense_is_read() {
     }
     assert!(depths > 0 && colors > 0, "{depths} {colors}");
 }
+
+/// A file of a ROS 2 bag: topics, and messages as (topic, time, data).
+fn db3(path: &Path, messages: &[(i64, i64, Vec<u8>)]) {
+    let connection = rusqlite::Connection::open(path).unwrap();
+    connection
+        .execute_batch(
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+                 serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
+             CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB NOT NULL);
+             CREATE INDEX timestamp_idx ON messages (timestamp ASC);
+             INSERT INTO topics VALUES(1, '/cam/depth/image_raw', 'sensor_msgs/msg/Image', 'cdr', '');
+             INSERT INTO topics VALUES(2, '/cam/depth/camera_info', 'sensor_msgs/msg/CameraInfo', 'cdr', '');
+             INSERT INTO topics VALUES(3, '/odd', 'x/msg/Y', 'protobuf', '');",
+        )
+        .unwrap();
+    for (topic, time, data) in messages {
+        let row = rusqlite::params![topic, time, data];
+        connection.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES(?1, ?2, ?3)", row).unwrap();
+    }
+}
+
+fn depth_message(seconds: u32) -> (i64, i64, Vec<u8>) {
+    (1, i64::from(seconds), cdr_image(seconds, "16UC1", 8, &depth_bytes(100 * seconds as u16)))
+}
+
+fn depths(source: &mut dyn Source) -> Vec<(i64, u16)> {
+    let mut found = Vec::new();
+    while let Some(frame) = source.next_frame().unwrap() {
+        found.push((frame.device_time_ns / 1_000_000_000, frame.depth.unwrap().values[0]));
+    }
+    found
+}
+
+#[test]
+fn bags_of_ros_2_are_read_as_folders_and_as_single_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("50% of it? #2");
+    fs::create_dir(&folder).unwrap();
+    let packed = |(topic, time, data): (i64, i64, Vec<u8>)| (topic, time, zstd::encode_all(&data[..], 1).unwrap());
+    // Rows are not in the order of time, and a file that is listed is missing.
+    db3(&folder.join("take_0.db3"), &[depth_message(12), (3, 0, vec![9]), (2, 5, cdr_info()), depth_message(11)]);
+    db3(&folder.join("take_1.db3"), &[packed(depth_message(13))]);
+    let list = "rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths:\n    - take_0.db3\n    - \"take_1.db3\"\n    - take_2.db3\n  duration:\n";
+    fs::write(folder.join("metadata.yaml"), list).unwrap();
+    let before = fs::read_dir(&folder).unwrap().count();
+    assert_eq!(crate::import::guess(&folder).unwrap(), crate::import::Format::Ros2Bag);
+    let mut source = crate::import::open(&folder, None).unwrap();
+    assert!(source.remarks()[0].contains("lists take_2.db3, which is not"), "{:?}", source.remarks());
+    assert_eq!(depths(source.as_mut()), [(11, 1100), (12, 1200), (13, 1300)]);
+    assert_eq!(crate::import::files(&folder).unwrap().len(), 3);
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), before, "nothing was created beside them");
+    let mut single = crate::import::open(&folder.join("take_0.db3"), None).unwrap();
+    assert_eq!((single.rig().sensors[0].depth.fx, depths(single.as_mut()).len()), (5.0, 2));
+    fs::remove_file(folder.join("metadata.yaml")).unwrap();
+    let mut unlisted = crate::import::open(&folder, None).unwrap();
+    assert_eq!((unlisted.remarks().len(), depths(unlisted.as_mut()).len()), (0, 3));
+}
+
+#[test]
+fn bags_of_ros_2_that_are_packed_torn_or_no_bags_are_told_from_each_other() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("take_0.db3");
+    let mut messages = vec![(2, 5, cdr_info())];
+    // Rows of about a page each, so that the last ones lie at the file's end.
+    messages.extend((10..40).map(|k| (1, i64::from(k), cdr_image(k, "16UC1", 2000, &vec![1; 3010]))));
+    db3(&path, &messages);
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() * 3 / 4]).unwrap();
+    let told = open_bag2(&path).map(|source| (source.frame_count(), source.remarks()));
+    let (frames, remarks) = told.unwrap();
+    assert!((10..30).contains(&frames.unwrap()) && remarks[0].contains("damaged"), "{frames:?} {remarks:?}");
+    let other = dir.path().join("other.db3");
+    rusqlite::Connection::open(&other).unwrap().execute_batch("CREATE TABLE a(b)").unwrap();
+    let told = open_bag2(&other).unwrap_err().to_string();
+    assert!(told.contains("cannot be read as a ROS 2 bag") && told.contains("topics"), "{told}");
+    let folder = dir.path().join("packed");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("take_0.db3.zstd"), ZSTD_HEAD).unwrap();
+    fs::write(folder.join("metadata.yaml"), "  relative_file_paths:\n  - packed/take_0.db3.zstd\n").unwrap();
+    let told = crate::import::open(&folder, None).err().unwrap().to_string();
+    assert!(told.contains("take_0.db3.zstd") && told.contains("zstd -d"), "{told}");
+}
+
+const ZSTD_HEAD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
