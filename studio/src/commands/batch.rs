@@ -1,30 +1,28 @@
 //! `toile batch`: a whole archive.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::{Arc, atomic::AtomicBool},
-    time::Duration,
-};
+use std::path::PathBuf;
 
-use signal_hook::{
-    consts::{SIGINT, SIGTERM},
-    flag,
-};
 use toile_archive::{
-    batch::{Choice, Event, Limits, Metrics, Outlook, Program, Ray, Version, cores, memory, run, run_on_ray},
-    catalog::Catalog,
+    batch::{Choice, Outlook, Version},
     compare::{self, compare, keep},
 };
 use toile_capture::printable_path;
-use toile_pipeline::{Observer, Options, json::plain, steps::STEPS};
+use toile_pipeline::{Options, json::plain, steps::STEPS};
 
-use super::{batch_report, reach::must_exist};
-use crate::{StudioError, outcome::Answer, run::say_line, session::Session};
+use super::{
+    batch_remote, batch_report,
+    batch_work::{Work, limits},
+    reach::must_exist,
+};
+use crate::{StudioError, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
 An archive is a folder that holds subjects, directly or in folders of its own. Each subject is processed by a process of its own, and
 as many side by side as processors and memory allow. What is up to date is not done again; a batch that was killed goes on
 where it was. A subject that fails is tried once more and then left out until it, its settings or the program change.
+
+An archive in a bucket (s3://, gs://, az://) is fetched into a cache subject by subject, processed there, and its results are sent back.
+Credentials come from the environment (AWS_ACCESS_KEY_ID and the like).
 
 With --json, every event is a line of JSON; the last line is the answer.
 
@@ -34,24 +32,25 @@ Examples:
   toile batch archive --workers 2 --memory 1500M
   toile batch archive --stage cut --since-version 0.2
   toile batch archive --keep old --compare old   # what the new version made different
-  toile batch archive --json | jq .";
+  toile batch archive --json | jq .
+  toile batch s3://bucket/archive --cache /fast/disk --cache-size 200G";
 
 /// Process a whole archive: what is stale, side by side
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Batch {
-    /// Folder that holds subjects
+    /// Folder that holds subjects, or s3://BUCKET/PREFIX, gs://BUCKET/PREFIX, az://CONTAINER/PREFIX
     #[arg(value_name = "ARCHIVE")]
-    archive: PathBuf,
+    pub(super) archive: PathBuf,
     /// Say what would be done and how long it takes, and do nothing
     #[arg(long)]
-    dry_run: bool,
+    pub(super) dry_run: bool,
     /// Subjects side by side at most (0: as many as there are processors)
     #[arg(long, default_value_t = 0, value_name = "N")]
-    workers: usize,
+    pub(super) workers: usize,
     /// Memory for all of them, such as 1500M or 6G (without: what cgroup, ulimit and machine leave)
     #[arg(long, value_name = "SIZE", value_parser = size)]
-    memory: Option<u64>,
+    pub(super) memory: Option<u64>,
     /// Only subjects whose results are of a program before this version
     #[arg(long, value_name = "VERSION")]
     since_version: Option<Version>,
@@ -63,33 +62,42 @@ pub struct Batch {
     again: bool,
     /// Settings of the stages; they win over those of SUBJECT/toile.toml
     #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
+    pub(super) settings: Option<PathBuf>,
     /// Keep the results that are replaced in this folder, for --compare
     #[arg(long, value_name = "DIR")]
-    keep: Option<PathBuf>,
+    pub(super) keep: Option<PathBuf>,
     /// Then compare the archive with these earlier results (a copy of it, or what --keep kept): accuracy proxies, overlap, measures, pictures
     #[arg(long, value_name = "OLD")]
-    compare: Option<PathBuf>,
+    pub(super) compare: Option<PathBuf>,
     /// Write figures in Prometheus' text format into this file while it runs
     #[arg(long, value_name = "FILE")]
-    metrics: Option<PathBuf>,
+    pub(super) metrics: Option<PathBuf>,
+    /// Serve the same figures at http://127.0.0.1:N/metrics while it runs (0: any free port, which is told)
+    #[arg(long, value_name = "N")]
+    pub(super) metrics_port: Option<u16>,
+    /// For an archive in a bucket: where subjects are processed (without: in the user's cache)
+    #[arg(long, value_name = "DIR")]
+    pub(super) cache: Option<PathBuf>,
+    /// For an archive in a bucket: how large the cache may become
+    #[arg(long, value_name = "SIZE", value_parser = size, default_value = "20G")]
+    pub(super) cache_size: u64,
     /// local: processes on this machine; ray: tasks on a Ray cluster (`pip install batch/` brings the bridge)
     #[arg(long, value_enum, default_value_t = Engine::Local)]
-    engine: Engine,
+    pub(super) engine: Engine,
     /// Of a Ray cluster, or `auto`; without, one is started on this machine for this batch
     #[arg(long, value_name = "ADDRESS")]
-    address: Option<String>,
+    pub(super) address: Option<String>,
     /// The Python that has the bridge
     #[arg(long, value_name = "FILE", default_value = "python3")]
-    python: PathBuf,
+    pub(super) python: PathBuf,
     /// How long to wait for a subject that another program writes, seconds
     #[arg(long, default_value_t = 600, value_name = "SECONDS")]
-    wait: u64,
+    pub(super) wait: u64,
 }
 
 /// Who runs the subjects' processes.
 #[derive(Debug, Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Engine {
+pub(super) enum Engine {
     Local,
     Ray,
 }
@@ -100,43 +108,21 @@ impl Batch {
     /// # Errors
     /// [`StudioError`] where the archive cannot be read or written; a subject that fails is named in the answer.
     pub fn run(&self, session: &Session) -> Result<Answer, StudioError> {
+        if batch_remote::is_url(&self.archive) {
+            return batch_remote::run(self, session);
+        }
         must_exist(&self.archive)?;
-        let options = Options { settings: self.settings.clone(), ..Options::default() };
-        let choice =
-            Choice { since_version: self.since_version.clone(), stage: self.stage.clone(), quarantined: self.again };
-        let outlook = Outlook::new(&self.archive, &options, &choice)?;
-        let (limits, threads) = self.limits(&outlook, session.globals.threads);
+        let outlook = Outlook::new(&self.archive, &self.options(), &self.choice())?;
         if self.dry_run {
-            return batch_report::outlook(&outlook, &limits);
+            return batch_report::outlook(&outlook, &limits(self, &outlook, session.globals.threads).0);
         }
         if let Some(old) = &self.keep {
             outlook.due().try_for_each(|(subject, _)| keep(&self.archive.join(subject), &old.join(subject)))?;
         }
-        let path = std::env::current_exe().map_err(|error| StudioError::io(Path::new("toile"), error))?;
-        let program = Program { path, threads, settings: self.settings.clone() };
-        let stop = stop_flag()?;
-        let mut catalog = Catalog::open(&self.archive)?;
-        let mut unnoted = Vec::new();
-        session.progress.plan(outlook.seconds());
-        let mut metrics = Metrics::new(outlook.due().count());
-        let mut hear = |event: &Event| {
-            tell(event, session);
-            metrics.hear(event);
-            unnoted.extend(self.metrics.as_ref().and_then(|file| metrics.write(file).err()));
-            if let Event::Ends { ended, .. } = event {
-                unnoted.extend(catalog.note(ended).err());
-            }
-        };
-        let totals = match self.engine {
-            Engine::Local => run(&self.archive, &outlook, &program, &options, &limits, &stop, &mut hear)?,
-            Engine::Ray => {
-                let (python, address) = (self.python.clone(), self.address.clone());
-                let ray = Ray { python, address, patience: limits.patience };
-                run_on_ray(&self.archive, &outlook, &program, &options, &ray, &stop, &mut hear)?
-            }
-        };
+        let mut work = Work::begin(self, session, outlook.due().count(), outlook.seconds())?;
+        let totals = work.run(&self.archive, &outlook, &mut |_| {})?;
         let mut answer = batch_report::totals(&outlook, &totals)?;
-        answer.warnings.extend(unnoted.first().map(ToString::to_string));
+        answer.warnings.extend(work.unnoted.first().map(ToString::to_string));
         if let Some(old) = &self.compare {
             let changes = compare(&self.archive, old)?;
             let page = compare::write(&changes, &self.archive, old, &self.archive.join(".toile/compare"))?;
@@ -148,46 +134,15 @@ impl Batch {
         Ok(answer)
     }
 
-    /// Subjects side by side, and threads of each: one where there are subjects enough for all processors.
-    fn limits(&self, outlook: &Outlook, threads: usize) -> (Limits, usize) {
-        let due = outlook.due().count().max(1);
-        let workers = if self.workers == 0 { cores().min(due) } else { self.workers };
-        let each = if self.workers == 0 { cores() / workers } else { 1 };
-        let threads = if threads == 0 { each.max(1) } else { threads };
-        (Limits { workers, memory: memory(self.memory), patience: Duration::from_secs(self.wait) }, threads)
+    /// The options of every run.
+    pub(super) fn options(&self) -> Options {
+        Options { settings: self.settings.clone(), ..Options::default() }
     }
-}
 
-/// Set by Ctrl-C, and by a polite request to end.
-fn stop_flag() -> Result<Arc<AtomicBool>, StudioError> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        flag::register(signal, stop.clone()).map_err(StudioError::Signal)?;
-    }
-    Ok(stop)
-}
-
-/// Tells an event: a line of JSON, or the progress and a line of the log.
-fn tell(event: &Event, session: &Session) {
-    if session.globals.json {
-        say_line(&plain(event).unwrap_or_default());
-    }
-    match event {
-        Event::Begins { subject, attempt, running } => {
-            tracing::info!(subject = %printable_path(subject), attempt, running, "begins");
-        }
-        Event::Again { subject, why } => {
-            tracing::warn!(subject = %printable_path(subject), why, "failed and is tried once more");
-        }
-        Event::Busy { subject } => {
-            tracing::info!(subject = %printable_path(subject), "another program writes it; it comes later");
-        }
-        Event::Ends { ended, done, of, .. } => {
-            let subject = printable_path(&ended.subject);
-            tracing::info!(%subject, outcome = ended.word(), seconds = ended.seconds, "ends");
-            session.progress.begin(&format!("{done} of {of} subjects, last {subject}"), ended.seconds);
-            session.progress.end();
-        }
+    /// Which subjects are meant.
+    pub(super) fn choice(&self) -> Choice {
+        let (since_version, stage) = (self.since_version.clone(), self.stage.clone());
+        Choice { since_version, stage, quarantined: self.again }
     }
 }
 
