@@ -49,4 +49,4 @@ fuzz: setup ## Fuzz all parsers of outside data for 10 minutes in all; SECONDS=n
 	bash fuzz/run.sh $(SECONDS)
 
 batch-trial: build ## A batch on a Ray cluster (from PyPI) whose worker, driver and node are killed; no part of `make test`
-	@bash tests/batch/batch.sh
+	@bash tests/batch/batch.sh ray

@@ -18,11 +18,15 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use toile_capture::files::atomic_write_with;
 use tokio::runtime::{Builder, Runtime};
 
-use super::{open, told::told};
+use super::{
+    open,
+    told::{is_final, told},
+};
 use crate::ArchiveError;
 
-/// How often a transfer is begun again that broke off in the middle; a request that failed at once is repeated by the store's client.
-const ATTEMPTS: u32 = 8;
+/// How often a transfer is begun again that broke off in the middle. A request that failed at once was repeated by the store's client
+/// already, for a minute and a half at most.
+const ATTEMPTS: u32 = 5;
 /// The first pause between two tries; it doubles.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Threads that wait for the network.
@@ -230,23 +234,6 @@ impl Bucket {
         let at = format!("{}/{path}", self.name.trim_end_matches('/'));
         ArchiveError::refused(Path::new(at.trim_end_matches('/')), told(error))
     }
-}
-
-/// True for what another try will not change.
-fn is_final(error: &Error) -> bool {
-    use Error::{InvalidPath, NotFound, NotSupported, PermissionDenied, Precondition, Unauthenticated};
-    // A request that failed at once was repeated by the store's client already.
-    let is_repeated = matches!(error, Error::Generic { store, .. } if *store != "transfer");
-    is_repeated
-        || matches!(
-            error,
-            InvalidPath { .. }
-                | NotFound { .. }
-                | NotSupported { .. }
-                | PermissionDenied { .. }
-                | Precondition { .. }
-                | Unauthenticated { .. }
-        )
 }
 
 /// The next part of a file, shorter at its end.
