@@ -23,7 +23,7 @@ mod without {
     use toile_archive::catalog::{Catalog, Synced};
 
     use super::{Answer, Session, StudioError};
-    use crate::commands::batch::Batch;
+    use crate::commands::batch_options::Batch;
 
     const REASON: &str = "this toile was built without cloud storage; build it with the cargo feature `cloud`";
 
@@ -54,7 +54,7 @@ mod remote {
     use toile_pipeline::{Options, hash_bytes, json::plain};
 
     use super::{Answer, Session, StudioError};
-    use crate::commands::{batch::Batch, batch_report, batch_work::Work};
+    use crate::commands::{batch_options::Batch, batch_report, batch_work::Work};
 
     /// Fetches what is stale, has it processed, and sends the results.
     pub(in crate::commands) fn run(batch: &Batch, session: &Session) -> Result<Answer, StudioError> {

@@ -21,7 +21,7 @@ use toile_archive::{
 use toile_capture::printable_path;
 use toile_pipeline::{Observer, Options, json::plain};
 
-use super::batch::{Batch, Engine};
+use super::batch_options::{Batch, Engine};
 use crate::{StudioError, run::say_line, session::Session};
 
 /// A batch at work.

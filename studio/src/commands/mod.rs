@@ -3,6 +3,7 @@
 pub mod animate;
 pub mod archive;
 pub mod batch;
+mod batch_options;
 mod batch_remote;
 mod batch_report;
 mod batch_work;
