@@ -32,6 +32,7 @@ test: demo ## The demo, then all tests, with the outside checkers that can be in
 	bash scripts/cargo.sh test --release --locked --workspace
 	bash scripts/cargo.sh test --release --locked -p toile-driver-kinect2 --test endurance -- --ignored
 	@bash tests/readme.sh
+	@bash tests/batch/batch.sh s3
 	@bash tests/wire/wire.sh
 
 docs: setup ## Build the book (target/book) and the API reference (target/doc)
@@ -48,4 +49,4 @@ fuzz: setup ## Fuzz all parsers of outside data for 10 minutes in all; SECONDS=n
 	bash fuzz/run.sh $(SECONDS)
 
 batch-trial: build ## A batch on a Ray cluster (from PyPI) whose worker, driver and node are killed; no part of `make test`
-	@bash tests/batch/batch.sh
+	@bash tests/batch/batch.sh ray

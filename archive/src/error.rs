@@ -39,6 +39,11 @@ impl ArchiveError {
     pub fn io(path: &Path, source: std::io::Error) -> Self {
         Self::Pipeline(PipelineError::io(path, source))
     }
+
+    /// True where there is no room on the disk.
+    pub fn is_full_disk(&self) -> bool {
+        matches!(self, Self::Pipeline(error) if error.kind() == "disk-full")
+    }
 }
 
 impl From<CaptureError> for ArchiveError {

@@ -11,7 +11,8 @@
 //! - [`catalog`]: an SQLite file about all of it;
 //! - [`anonymize()`]: a copy of a subject in which nobody is recognised;
 //! - [`compare`]: what another version made different;
-//! - [`keep`]: checking, packing, unpacking and forgetting.
+//! - [`keep`]: checking, packing, unpacking and forgetting;
+//! - `remote` (feature `cloud`): archives in buckets.
 //!
 //! ```
 //! # fn main() -> Result<(), toile_archive::ArchiveError> {
@@ -29,6 +30,8 @@ pub mod compare;
 mod error;
 mod find;
 pub mod keep;
+#[cfg(feature = "cloud")]
+pub mod remote;
 mod state;
 
 pub use anonymize::{Anonymized, anonymize};

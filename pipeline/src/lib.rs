@@ -10,10 +10,11 @@
 //! - [`Settings`]: of all stages, from `toile.toml`;
 //! - [`Run`]: one run over one subject; [`Folders`]: where its files lie;
 //! - [`plan()`]: what a run would have to do, from the [`Ticket`] that the last one left, without reading a take;
-//! - [`Observer`]: the receiver of a run's progress.
+//! - [`Observer`]: the receiver of a run's progress; [`Account`]: how far it is by that, and how long it will take.
 //!
 //! A run can stop anywhere and go on later with the same result.
 
+mod account;
 mod animate;
 mod asked;
 mod avatar_choice;
@@ -57,6 +58,7 @@ mod ticket;
 mod wear;
 mod worn;
 
+pub use account::Account;
 pub use animate::{AnimateOptions, Animated, AnimationReport, Profile, animate};
 pub use asked::Asked;
 pub use body_edits::BodyEdits;

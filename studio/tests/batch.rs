@@ -5,6 +5,8 @@ mod common;
 
 use std::{
     fs,
+    io::{BufRead, BufReader, Read, Write},
+    net::TcpStream,
     path::{Path, PathBuf},
     process::{Command, Stdio},
     sync::OnceLock,
@@ -200,7 +202,10 @@ fn two_batches_on_one_archive_do_every_subject_once() {
     let names = ["a", "b", "c", "d"];
     let dir = archive(&names);
     let start = || {
-        toile().arg("batch").arg(dir.path()).args(["--workers", "1", "--json"]).stdout(Stdio::piped()).spawn().unwrap()
+        let words = ["--workers", "1", "--json"];
+        let mut command = toile();
+        command.arg("batch").arg(dir.path()).args(words).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().unwrap()
     };
     let both = [start(), start()].map(|child| child.wait_with_output().unwrap());
     let outcomes: Vec<String> = both
@@ -219,6 +224,39 @@ fn two_batches_on_one_archive_do_every_subject_once() {
     assert!(both.iter().all(|done| done.status.success()), "{outcomes:?}");
     assert_eq!(outcomes.iter().filter(|outcome| *outcome == "done").count(), 4, "{outcomes:?}");
     names.iter().for_each(|name| assert_same_results(&dir.path().join(name)));
+    // What the other one did counts as done, and the bar never goes back.
+    for done in &both {
+        let shares = shares(&String::from_utf8_lossy(&done.stderr));
+        assert!(shares.is_sorted() && !shares.is_empty(), "{shares:?}");
+    }
+}
+
+/// The percentages that a run without a terminal told.
+fn shares(said: &str) -> Vec<u32> {
+    let share = |line: &str| line.strip_prefix('[')?.split_once(" %]")?.0.trim().parse().ok();
+    said.lines().filter_map(share).collect()
+}
+
+#[test]
+fn the_figures_of_a_running_batch_are_at_a_port_of_this_machine() {
+    let dir = archive(&["a", "b"]);
+    let mut command = toile();
+    command.arg("batch").arg(dir.path()).args(["--workers", "1", "--json", "--metrics-port", "0"]);
+    let mut running = command.stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(running.stdout.take().unwrap()).lines();
+    let first: Value = serde_json::from_str(&lines.next().unwrap().unwrap()).unwrap();
+    let url = first["url"].as_str().unwrap().to_string();
+    let host = url.strip_prefix("http://").unwrap().strip_suffix("/metrics").unwrap();
+    // It has begun with the first subject.
+    lines.next().unwrap().unwrap();
+    let mut stream = TcpStream::connect(host).unwrap();
+    stream.write_all(b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();
+    let mut text = String::new();
+    stream.read_to_string(&mut text).unwrap();
+    assert!(text.contains("\ntoile_batch_subjects_due 2\n"), "{text}");
+    assert!(text.contains("\ntoile_batch_subjects_running 1\n"), "{text}");
+    running.kill().unwrap();
+    running.wait().unwrap();
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::ArchiveError;
 pub(super) fn write(subject: &Subject, to: &Path, name: &str) -> Result<(), ArchiveError> {
     let mut text = format!("name = {}\ndate = \"\"\nrig = {}\n", quoted(name), quoted(subject.rig()));
     text.push_str(
-        "notes = \"Made anonymous by Toile: colour removed, head smoothed, name, date and notes replaced.\"\n",
+        "notes = \"Made anonymous by Toile: colour removed, head replaced by a smooth one, name, date, notes and the device's serial number removed.\"\n",
     );
     text.push_str(&consent(&read_text(&subject.folder().join("subject.toml"))?));
     for layer in subject.layers() {

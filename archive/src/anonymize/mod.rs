@@ -1,7 +1,9 @@
-//! A copy of a subject in which nobody is recognised: no colour, a smooth head, another name.
+//! A copy of a subject in which nobody is recognised: no colour, a smooth head in place of the person's, no names of people or
+//! devices.
 
 mod about;
 mod head;
+mod smooth_head;
 
 use std::{
     fs,
@@ -9,7 +11,9 @@ use std::{
 };
 
 use serde::Serialize;
-use toile_capture::{Frame, Recorder, RecorderOptions, Replay, Rig, Sensor, Source, Subject, SubjectLock, trajectory};
+use toile_capture::{
+    DeviceIdentity, Frame, Recorder, RecorderOptions, Replay, Rig, Sensor, Source, Subject, SubjectLock, trajectory,
+};
 use toile_pipeline::{Folders, read_mesh};
 
 use crate::ArchiveError;
@@ -22,14 +26,14 @@ pub struct Anonymized {
     pub to: PathBuf,
     /// Takes in it.
     pub takes: usize,
-    /// Frames whose head was smoothed.
+    /// Frames whose head was replaced.
     pub frames: u64,
     /// Frames that were left out, since nobody knows where the head is in them.
     pub left_out: u64,
 }
 
-/// Writes a copy of the processed subject at `root` to the new folder `to`, called `name`: takes without colour and with the surface of the
-/// head smoothed until no face is left, no results, no notes, no date. What was done stands in its `subject.toml`.
+/// Writes a copy of the processed subject at `root` to the new folder `to`, called `name`: takes without colour, with a smooth
+/// head in place of the person's and without the device's serial number, no results, no notes, no date. What was done stands in its `subject.toml`.
 ///
 /// # Errors
 /// [`ArchiveError`] where the subject was not processed, a take cannot be made anonymous (a finished scan, several sensors), or
@@ -72,16 +76,22 @@ fn take(root: &Path, label: &str, to: &Path, done: &mut Anonymized) -> Result<()
     };
     let head = Head::of(&read_mesh(&scan)?, trajectory::read(&way)?, sensor);
     let Some(head) = head else { return refused("its scan is empty") };
-    let sensor = Sensor { color: None, ..sensor.clone() };
+    // Serial number and firmware tell which device it was, and so where and when.
+    let identity = DeviceIdentity { serial: String::new(), firmware: String::new(), ..sensor.identity.clone() };
+    let sensor = Sensor { color: None, identity, ..sensor.clone() };
     let rig = Rig { sensors: vec![sensor] };
     let mut recorder =
         Recorder::create(to, &rig, RecorderOptions { replace_part: true, ..RecorderOptions::default() })?;
+    // Times begin with the take: those of a clock that knows the date would tell it.
+    let mut begin = None;
     while let Some(frame) = replay.next_frame()? {
-        let Some(depth) = frame.depth.as_ref().and_then(|depth| head.smooth(depth, frame.device_time_ns)) else {
+        let (device, host) = *begin.get_or_insert((frame.device_time_ns, frame.host_time_ns));
+        let Some(depth) = frame.depth.as_ref().and_then(|depth| head.replace(depth, frame.device_time_ns)) else {
             done.left_out += 1;
             continue;
         };
-        recorder.write(&Frame { depth: Some(depth.into()), color: None, ..frame })?;
+        let (device_time_ns, host_time_ns) = (frame.device_time_ns - device, frame.host_time_ns - host);
+        recorder.write(&Frame { depth: Some(depth.into()), color: None, device_time_ns, host_time_ns, ..frame })?;
         done.frames += 1;
     }
     recorder.finish()?;

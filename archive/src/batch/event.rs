@@ -27,6 +27,8 @@ pub enum Event<'a> {
         done: usize,
         /// Subjects in all.
         of: usize,
+        /// Seconds that it was expected to take.
+        expected_seconds: f64,
         /// Expected seconds until the end of the batch.
         seconds_left: f64,
     },
@@ -88,6 +90,11 @@ pub struct Ended {
 }
 
 impl Ended {
+    /// True where it has results of its own run.
+    pub fn has_result(&self) -> bool {
+        matches!(self.outcome, Fate::Done | Fate::Lost | Fate::FailedInPart)
+    }
+
     /// The word as it is printed.
     pub fn word(&self) -> &'static str {
         match self.outcome {

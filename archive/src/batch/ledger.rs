@@ -71,6 +71,7 @@ impl<'a> Ledger<'a> {
             ended: &ended,
             done: self.totals.ended.len() + 1,
             of: self.of,
+            expected_seconds: expected,
             seconds_left: pace * self.ahead,
         };
         (self.hear)(&event);

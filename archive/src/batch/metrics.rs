@@ -1,5 +1,4 @@
-//! Figures of a batch in Prometheus' text format, for the textfile collector of its node exporter or any program that serves
-//! a file.
+//! Figures of a batch in Prometheus' text format: in a file, for the textfile collector of its node exporter, or at a port.
 
 use std::{collections::BTreeMap, fmt::Write, path::Path};
 
@@ -9,7 +8,7 @@ use super::event::{Event, Fate};
 use crate::ArchiveError;
 
 /// What was counted so far.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Metrics {
     due: usize,
     running: usize,
@@ -55,7 +54,8 @@ impl Metrics {
         Ok(atomic_write(path, self.text().as_bytes())?)
     }
 
-    fn text(&self) -> String {
+    /// All of them as text.
+    pub(super) fn text(&self) -> String {
         let mut text = String::new();
         let mut gauge = |name: &str, kind: &str, help: &str, value: f64| {
             let _ = writeln!(
@@ -110,7 +110,7 @@ mod tests {
         let ended = serde_json::json!({ "subject": "a", "outcome": "done", "why": null, "attempts": 1, "seconds": 2.5,
             "cpu_seconds": 2.0, "peak_memory_bytes": 7, "warnings": [], "lost": [], "failures": [] });
         let ended = serde_json::from_value(ended).unwrap();
-        metrics.hear(&Event::Ends { ended: &ended, done: 1, of: 3, seconds_left: 5.0 });
+        metrics.hear(&Event::Ends { ended: &ended, done: 1, of: 3, expected_seconds: 2.0, seconds_left: 5.0 });
         let text = metrics.text();
         for line in
             ["subjects_due 3", "subjects_running 1", "subject_seconds_total 2.5", "subjects_total{outcome=\"done\"} 1"]

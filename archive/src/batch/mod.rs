@@ -3,6 +3,7 @@
 mod event;
 mod ledger;
 mod metrics;
+mod metrics_port;
 mod outlook;
 mod quarantine;
 mod ray;
@@ -14,6 +15,7 @@ mod worker;
 pub use event::{Ended, Event, Fate};
 pub use ledger::Totals;
 pub use metrics::Metrics;
+pub use metrics_port::MetricsPort;
 pub use outlook::{Choice, Outlook, Prospect, Version};
 pub use ray::{Ray, run_on_ray};
 pub use resources::{Memory, cores, memory};

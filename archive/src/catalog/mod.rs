@@ -1,7 +1,10 @@
 //! The catalogue: an SQLite file about everything in an archive. It can be built again from the archive at any time.
 
+#[cfg(feature = "cloud")]
+mod bucket;
 mod export;
 mod facts;
+mod parquet;
 mod query;
 
 use std::{
@@ -80,19 +83,30 @@ impl Catalog {
     /// # Errors
     /// [`ArchiveError`] where the archive cannot be listed or the catalogue not be written.
     pub fn sync(&mut self) -> Result<Synced, ArchiveError> {
-        let found = subjects(&self.archive)?;
-        let known = self.stamps()?;
         let archive = self.archive.clone();
+        let found = subjects(&archive)?.into_par_iter().map(|subject| {
+            let stamp = stamp(&archive.join(&subject));
+            (subject, stamp)
+        });
+        self.bring(found.collect(), |subject| Facts::read(&archive.join(subject)))
+    }
+
+    /// Reads the subjects whose stamps are others than those that are known.
+    fn bring(
+        &mut self,
+        found: Vec<(PathBuf, String)>,
+        read: impl Fn(&Path) -> Result<Facts, ArchiveError> + Sync,
+    ) -> Result<Synced, ArchiveError> {
+        let known = self.stamps()?;
         let changed: Vec<_> = found
             .par_iter()
-            .filter_map(|subject| {
-                let stamp = stamp(&archive.join(subject));
+            .filter_map(|(subject, stamp)| {
                 let name = subject.to_string_lossy().into_owned();
-                (known.get(&name) != Some(&stamp)).then(|| (name, stamp, Facts::read(&archive.join(subject))))
+                (known.get(&name) != Some(stamp)).then(|| (name, stamp, read(subject)))
             })
             .collect();
         let mut synced = Synced { subjects: found.len(), ..Synced::default() };
-        let names: std::collections::BTreeSet<_> = found.iter().map(|subject| subject.to_string_lossy()).collect();
+        let names: std::collections::BTreeSet<_> = found.iter().map(|(subject, _)| subject.to_string_lossy()).collect();
         let gone: Vec<&String> = known.keys().filter(|name| !names.contains(name.as_str())).collect();
         synced.removed = gone.len();
         self.write(|transaction| {

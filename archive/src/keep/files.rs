@@ -37,7 +37,7 @@ pub(super) struct Manifest {
 pub(super) const MANIFEST: &str = "toile-pack.json";
 
 /// Every regular file below `folder` by its path in it, in order, without unfinished ones. Links are passed over.
-pub(super) fn list(folder: &Path) -> Result<Vec<String>, ArchiveError> {
+pub(crate) fn list(folder: &Path) -> Result<Vec<String>, ArchiveError> {
     let (mut found, mut waiting) = (Vec::new(), vec![folder.to_path_buf()]);
     while let Some(at) = waiting.pop() {
         let wrong = |error| ArchiveError::io(&at, error);
@@ -66,7 +66,7 @@ pub(super) fn stamp(path: &Path) -> Result<(u64, u64), ArchiveError> {
 }
 
 /// `name` below `folder`, where it stays inside.
-pub(super) fn inside(folder: &Path, name: &str) -> Option<PathBuf> {
+pub(crate) fn inside(folder: &Path, name: &str) -> Option<PathBuf> {
     let path = Path::new(name);
     let plain = !name.is_empty() && path.components().all(|part| matches!(part, Component::Normal(_)));
     plain.then(|| folder.join(path))

@@ -8,6 +8,8 @@ mod tombstone;
 mod unpack;
 
 pub use check::{Checked, check};
+#[cfg(feature = "cloud")]
+pub(crate) use files::{inside, list};
 pub use forget::{Forgotten, forget};
 pub use pack::{Packed, pack};
 pub(crate) use tombstone::forgotten;

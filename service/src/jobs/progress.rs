@@ -12,7 +12,7 @@ use std::{
 };
 
 use toile_capture::printable;
-use toile_pipeline::Observer;
+use toile_pipeline::{Account, Observer};
 
 use crate::yielding::Priority;
 
@@ -45,13 +45,7 @@ pub struct Hearing<'a> {
 
 struct State {
     log: File,
-    label: String,
-    /// Expected seconds of what is still to be done, the running step included; of what is done; and of the running step.
-    ahead: f64,
-    done: f64,
-    step: f64,
-    fraction: f64,
-    started: Instant,
+    account: Account,
     told: Option<Instant>,
 }
 
@@ -63,16 +57,7 @@ impl<'a> Hearing<'a> {
         log: File,
         tell: &'a (dyn Fn(Progress) + Sync),
     ) -> Self {
-        let state = State {
-            log,
-            label: String::new(),
-            ahead: 0.0,
-            done: 0.0,
-            step: 0.0,
-            fraction: 0.0,
-            started: Instant::now(),
-            told: None,
-        };
+        let state = State { log, account: Account::default(), told: None };
         Self { cancel, priority, tell, state: Mutex::new(state) }
     }
 
@@ -108,36 +93,31 @@ impl<'a> Hearing<'a> {
 }
 
 fn say(state: &mut State, line: &str) {
-    let seconds = state.started.elapsed().as_secs_f64();
+    let seconds = state.account.elapsed().as_secs_f64();
     // The log is for people; that it cannot be written must not stop the work.
     drop(writeln!(state.log, "{seconds:8.1} s  {}", printable(line)));
 }
 
 fn progress(state: &State) -> Progress {
-    let (whole, done) = ((state.done + state.ahead).max(1e-9), state.done + state.fraction * state.step);
-    let elapsed = state.started.elapsed().as_secs_f64();
-    // Too little is done for an estimate before that.
-    let is_known = done > 0.02 * whole && elapsed > 1.0;
-    let left = is_known.then(|| (elapsed * (whole - done) / done).max(0.0));
-    Progress { step: state.label.clone(), fraction: (done / whole).clamp(0.0, 1.0), seconds_left: left, paused: false }
+    let account = &state.account;
+    let (step, fraction, seconds_left) = (account.label().to_string(), account.share(), account.seconds_left());
+    Progress { step, fraction, seconds_left, paused: false }
 }
 
 impl Observer for Hearing<'_> {
     fn plan(&self, cost: f64) {
-        self.state().ahead += cost;
+        self.state().account.plan(cost);
     }
 
     fn skip(&self, cost: f64) {
         self.stop_or_wait();
-        let mut state = self.state();
-        state.ahead = (state.ahead - cost).max(0.0);
+        self.state().account.skip(cost);
     }
 
     fn begin(&self, label: &str, cost: f64) {
         self.stop_or_wait();
         let mut state = self.state();
-        (state.label, state.step, state.fraction) = (printable(label).into_owned(), cost, 0.0);
-        state.ahead = state.ahead.max(cost);
+        state.account.begin(label, cost);
         say(&mut state, label);
         self.told(&mut state, true);
     }
@@ -145,15 +125,12 @@ impl Observer for Hearing<'_> {
     fn at(&self, fraction: f32) {
         self.stop_or_wait();
         let mut state = self.state();
-        state.fraction = f64::from(fraction).clamp(state.fraction, 1.0);
+        state.account.at(f64::from(fraction));
         self.told(&mut state, false);
     }
 
     fn end(&self) {
-        let mut state = self.state();
-        state.ahead = (state.ahead - state.step).max(0.0);
-        state.done += state.step;
-        (state.step, state.fraction) = (0.0, 0.0);
+        self.state().account.end();
     }
 
     fn remark(&self, sentence: &str) {

@@ -74,7 +74,8 @@ pub(super) fn totals(outlook: &Outlook, totals: &Totals) -> Result<Answer, Studi
         };
         answer.failures.extend(ended.why.iter().map(|why| format!("{}{left}", named(why))));
     }
-    if totals.disk_full {
+    // The subject that met the full disk says so, with the file.
+    if totals.disk_full && !answer.failures.iter().any(|failure| failure.contains("the disk is full")) {
         answer
             .failures
             .push("the disk is full: free some space and run the batch again; nothing half-written is left".into());

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
-use toile_archive::catalog::{Catalog as Book, QUERIES, Table};
+use toile_archive::catalog::{Catalog as Book, QUERIES, Synced, Table};
 use toile_capture::printable_path;
 use toile_pipeline::json::plain;
 
-use super::reach::must_exist;
+use super::{batch_remote, reach::must_exist};
 use crate::{StudioError, outcome::Answer, session::Session};
 
 const AFTER: &str = "\
@@ -17,6 +17,7 @@ Examples:
   toile catalog archive                              # every subject
   toile catalog archive doubted --since 0.2          # all fits doubted since version 0.2
   toile catalog archive girths --csv > girths.csv
+  toile catalog archive measures --parquet measures.parquet
   toile catalog archive --sql 'SELECT avg(value_m) FROM measures WHERE name = \"stature\"'
   toile catalog archive --export tables              # a CSV file a table";
 
@@ -24,7 +25,7 @@ Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = AFTER)]
 pub struct Catalog {
-    /// Folder that holds subjects
+    /// Folder that holds subjects, or s3://BUCKET/PREFIX, gs://BUCKET/PREFIX, az://CONTAINER/PREFIX
     #[arg(value_name = "ARCHIVE")]
     archive: PathBuf,
     /// A question by its name (`list` shows all of them)
@@ -39,9 +40,15 @@ pub struct Catalog {
     /// Answer as CSV
     #[arg(long)]
     csv: bool,
+    /// Write the answer as a Parquet file
+    #[arg(long, value_name = "FILE")]
+    parquet: Option<PathBuf>,
     /// Write every table as CSV into this folder
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
+    /// For an archive in a bucket: the folder that keeps the catalogue (without: in the user's cache)
+    #[arg(long, value_name = "DIR")]
+    cache: Option<PathBuf>,
     /// Throw the catalogue away and read the whole archive again (how earlier batches went is lost)
     #[arg(long)]
     rebuild: bool,
@@ -53,7 +60,6 @@ impl Catalog {
     /// # Errors
     /// [`StudioError`] where the archive cannot be read, or there is no such question.
     pub fn run(&self, _: &Session) -> Result<Answer, StudioError> {
-        must_exist(&self.archive)?;
         if self.question == "list" {
             return Ok(list());
         }
@@ -68,11 +74,7 @@ impl Catalog {
                 })?
             }
         };
-        if self.rebuild {
-            Book::discard(&self.archive);
-        }
-        let mut book = Book::open(&self.archive)?;
-        let synced = book.sync()?;
+        let (book, synced) = self.book()?;
         let warnings = synced.broken.clone();
         if let Some(folder) = &self.export {
             let files = book.export(folder)?;
@@ -85,10 +87,32 @@ impl Catalog {
             });
         }
         let table = book.ask(sql, &self.since)?;
+        if let Some(file) = &self.parquet {
+            table.write_parquet(file)?;
+            let (text, file) = (printable_path(file), file.display().to_string());
+            let results = json!({ "files": [file], "rows": table.rows.len(), "synced": plain(&synced)? });
+            return Ok(Answer { text, results, warnings, ..Answer::default() });
+        }
         let text = if self.csv { table.csv() } else { columns(&table) };
         let file = printable_path(book.path());
         let results = json!({ "table": plain(&table)?, "synced": plain(&synced)?, "file": file });
         Ok(Answer { text, results, warnings, ..Answer::default() })
+    }
+}
+
+impl Catalog {
+    /// The catalogue, up to date.
+    fn book(&self) -> Result<(Book, Synced), StudioError> {
+        if batch_remote::is_url(&self.archive) {
+            return batch_remote::book(&self.archive, self.cache.as_deref(), self.rebuild);
+        }
+        must_exist(&self.archive)?;
+        if self.rebuild {
+            Book::discard(&self.archive);
+        }
+        let mut book = Book::open(&self.archive)?;
+        let synced = book.sync()?;
+        Ok((book, synced))
     }
 }
 

@@ -3,7 +3,10 @@
 pub mod animate;
 pub mod archive;
 pub mod batch;
+mod batch_options;
+mod batch_remote;
 mod batch_report;
+mod batch_work;
 pub mod calibrate;
 mod calibrate_board;
 pub mod capture;

@@ -109,6 +109,8 @@ const ONLY: &[(&str, &[&str])] = &[
     ("mcap", &["capture"]),
     ("gltf-json", &["avatar"]),
     ("rusqlite", &["archive", "capture", "service"]),
+    ("object_store", &["archive"]),
+    ("parquet", &["archive"]),
 ];
 
 /// Words that must not stand in a crate's source: crate, words, and which promise of ARCHITECTURE.md that keeps.
