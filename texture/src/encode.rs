@@ -23,17 +23,28 @@ impl Texture {
         Ok(bytes)
     }
 
+    /// The texture as a PNG.
+    ///
+    /// # Errors
+    /// [`TextureError::Encode`].
+    pub fn to_png(&self) -> Result<Vec<u8>, TextureError> {
+        png(self.pixels.as_flattened(), self.size, ExtendedColorType::Rgb8)
+    }
+
     /// What was seen, as a grey PNG: 255 seen, 128 filled, 0 between charts.
     ///
     /// # Errors
     /// [`TextureError::Encode`].
     pub fn seen_to_png(&self) -> Result<Vec<u8>, TextureError> {
-        let mut bytes = Vec::new();
-        let encoder =
-            png::PngEncoder::new_with_quality(&mut bytes, png::CompressionType::Fast, png::FilterType::NoFilter);
-        encoder
-            .write_image(&self.seen, self.size, self.size, ExtendedColorType::L8)
-            .map_err(|error| TextureError::Encode(error.to_string()))?;
-        Ok(bytes)
+        png(&self.seen, self.size, ExtendedColorType::L8)
     }
+}
+
+/// A square picture as a PNG file.
+fn png(bytes: &[u8], size: u32, kind: ExtendedColorType) -> Result<Vec<u8>, TextureError> {
+    let mut file = Vec::new();
+    png::PngEncoder::new_with_quality(&mut file, png::CompressionType::Fast, png::FilterType::NoFilter)
+        .write_image(bytes, size, size, kind)
+        .map_err(|error| TextureError::Encode(error.to_string()))?;
+    Ok(file)
 }

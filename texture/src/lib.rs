@@ -9,10 +9,13 @@
 //!    each picture what brings it there; `views` chooses the pictures that detail comes from;
 //! 4. [`bake`] gives each texel its colour; `pad` fills between charts.
 //!
+//! [`carry`] brings a texture from one surface to the atlas of another that lies on it.
+//!
 //! Nothing here moves geometry.
 
 mod atlas;
 mod bake;
+mod carry;
 mod charts;
 mod encode;
 mod error;
@@ -35,9 +38,10 @@ mod zonal;
 
 pub use atlas::Atlas;
 pub use bake::{Texture, bake};
+pub use carry::{CarrySettings, Painted, carry};
 pub use error::TextureError;
 pub use photo::Photo;
 pub use report::TextureReport;
 pub use settings::TextureSettings;
 pub use size::fitting_size;
-pub use unwrap::unwrap;
+pub use unwrap::{unwrap, unwrap_from};

@@ -40,7 +40,7 @@ pub fn dressed() -> Avatar {
 }
 
 fn layer(name: &str, mesh: toile_geometry::Mesh, weights: SkinWeights, order: u32) -> AvatarLayer {
-    AvatarLayer { name: name.into(), mesh, weights, order, garment: None, thickness: None }
+    AvatarLayer { name: name.into(), mesh, weights, order, garment: None, thickness: None, texture: None }
 }
 
 /// Hips that rise, an arm that turns a full circle, a knee bent all the time.

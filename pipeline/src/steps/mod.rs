@@ -4,6 +4,7 @@ pub mod cut;
 pub mod export;
 pub mod fit;
 pub mod fuse;
+pub mod layer_texture;
 pub mod page;
 pub mod pose;
 pub mod read_scan;
@@ -36,6 +37,7 @@ pub const STEPS: &[StepFacts] = &[
     facts::<pose::PoseUnder>(),
     facts::<cut::Cut>(),
     facts::<stack::Stack>(),
+    facts::<layer_texture::LayerTexturing>(),
     facts::<export::Export>(),
     facts::<page::Page>(),
 ];
