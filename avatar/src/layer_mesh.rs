@@ -10,6 +10,7 @@ use toile_geometry::Mesh;
 use crate::{
     AvatarLayer,
     buffer::{Buffer, Shape, Target},
+    tangents,
 };
 
 /// The linear colour of a layer whose vertices have none.
@@ -30,6 +31,10 @@ pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buff
     });
     if let Some(texture) = &layer.texture {
         attributes["TEXCOORD_0"] = json!(buffer.add(texture.uv.as_flattened(), Shape::Vec2, Target::Vertices));
+        if texture.normal.is_some() {
+            let tangents = tangents(mesh, &texture.uv);
+            attributes["TANGENT"] = json!(buffer.add(tangents.as_flattened(), Shape::Vec4, Target::Vertices));
+        }
     } else if !mesh.colors.is_empty() {
         let colors = buffer.add(&linear_colors(&mesh.colors), Shape::Vec4, Target::Vertices);
         attributes["COLOR_0"] = json!(buffer.normalized(colors));

@@ -15,7 +15,7 @@ use crate::{
     PipelineError,
     folders::Folders,
     formats::FileFormat,
-    json, motion,
+    json, levels, motion,
     options::{HiddenChoice, MotionChoice, Options, Springs},
 };
 
@@ -35,6 +35,9 @@ pub struct AvatarChoice {
     /// The formats that it is written in beside GLB and VRM.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub formats: Vec<FileFormat>,
+    /// The levels of detail that it is also written in, triangles a layer, falling.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<usize>,
 }
 
 impl AvatarChoice {
@@ -67,6 +70,11 @@ impl AvatarChoice {
         if let Some(asked) = &options.formats {
             choice.formats = FileFormat::beside_usual(asked);
         }
+        if let Some(asked) = &options.levels {
+            choice.levels.clone_from(asked);
+            choice.levels.sort_unstable_by(|a, b| b.cmp(a));
+            choice.levels.dedup();
+        }
         choice.springs = options.springs.or(choice.springs);
         choice.joint_names = options.joint_names.unwrap_or(choice.joint_names);
         if choice != before {
@@ -97,7 +105,11 @@ impl AvatarChoice {
             let names: Vec<&str> = self.formats.iter().map(|f| f.name()).collect();
             format!("files as {} (`toile export --to glb,vrm` for the usual ones alone)", names.join(", "))
         });
-        [motion, hidden, names, springs, formats].into_iter().flatten().collect()
+        let levels = (!self.levels.is_empty()).then(|| {
+            let names: Vec<String> = self.levels.iter().map(|&n| levels::file_name(n)).collect();
+            format!("levels of detail as {} (`toile export --lod off` for none)", names.join(", "))
+        });
+        [motion, hidden, names, springs, formats, levels].into_iter().flatten().collect()
     }
 }
 

@@ -66,12 +66,7 @@ impl Caches {
 
     /// Goes on with the caches of an interrupted run of the same layers and frames, `done` of which are kept; `None` where they are not there
     /// or shorter.
-    pub fn go_on(
-        folder: &Path,
-        layers: &[Cache],
-        frames: usize,
-        done: usize,
-    ) -> Result<Option<Self>, PipelineError> {
+    pub fn go_on(folder: &Path, layers: &[Cache], frames: usize, done: usize) -> Result<Option<Self>, PipelineError> {
         let mut opened = Vec::with_capacity(layers.len());
         for layer in layers {
             let (name, points) = (layer.name, layer.points());

@@ -28,6 +28,7 @@ use crate::{
     garment::Garment,
     json,
     layer_files::texture_of,
+    levels::{self, Level},
     look,
     look::Look,
     meshes::{read_mesh, read_skinned},
@@ -60,6 +61,9 @@ pub struct Exported {
     pub left_out: BTreeMap<String, LeftOut>,
     /// The spring bones of the VRM file, where something hangs loose and they are wanted.
     pub springs: Option<Hung>,
+    /// The levels of detail that were written.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<Level>,
     /// The layers in the exported motion and in the T-pose of the VRM file.
     pub look: Look,
 }
@@ -101,6 +105,16 @@ impl Export<'_> {
         let folders = &self.run.folders;
         let of_garments = self.garments.iter().map(|g| (g.name.as_str(), folders.garment_layer(&g.layer)));
         std::iter::once((BODY, folders.body_layer())).chain(of_garments).filter(|(_, path)| is_there(path)).collect()
+    }
+
+    /// The levels of detail that are asked for, and their files.
+    fn levels(&self, avatar: &Avatar) -> Result<(Vec<Level>, Vec<Vec<u8>>), PipelineError> {
+        let wrong = |e: String| PipelineError::refused(&self.run.folders.glb(), format!("its levels of detail: {e}"));
+        let made = levels::levels(avatar, &self.choice.levels).map_err(wrong)?;
+        let file = |(avatar, level): (Avatar, Level)| {
+            write_glb(&avatar).map(|glb| (level, glb)).map_err(|e| PipelineError::stage(&self.run.folders.glb(), e))
+        };
+        Ok(made.into_iter().map(file).collect::<Result<Vec<_>, _>>()?.into_iter().unzip())
     }
 
     /// Names of the layers, whether or not something of them is left.
@@ -192,6 +206,7 @@ impl Step for Export<'_> {
         let (folders, formats) = (&self.run.folders, &self.choice.formats);
         let mut files = vec![folders.glb(), folders.vrm()];
         files.extend(exchange::paths(folders, formats, &self.layer_names(), &self.textured()));
+        files.extend(self.choice.levels.iter().map(|&n| folders.root.join(levels::file_name(n))));
         files
     }
 
@@ -218,11 +233,13 @@ impl Step for Export<'_> {
         let vrm = write_vrm(&avatar, &VrmMeta::default(), springs.as_ref()).map_err(wrong)?;
         let others =
             exchange::contents(&avatar, &self.choice.formats, &self.layer_names(), &pictures).map_err(wrong)?;
-        let files = self.outputs().into_iter().zip([glb, vrm].into_iter().chain(others)).collect();
+        progress(0.8);
+        let (levels, simple) = self.levels(&avatar)?;
+        let files = self.outputs().into_iter().zip([glb, vrm].into_iter().chain(others).chain(simple)).collect();
         let of_motion = moved.report.warnings.iter().map(|w| format!("motion {}: {w}", look.motion));
         let warnings = of_motion.chain(look.warnings()).collect();
         let springs = springs.map(|s| Hung::of(&s, &avatar));
-        Ok(Product::new(files, Exported { motion: moved.report, left_out, springs, look }, warnings))
+        Ok(Product::new(files, Exported { motion: moved.report, left_out, springs, levels, look }, warnings))
     }
 }
 
