@@ -40,3 +40,31 @@ pub(crate) fn texture_of(path: &Path, mesh: &Mesh) -> Result<LayerTexture, Pipel
 fn other(path: &Path) -> PipelineError {
     PipelineError::format(path, "shows another mesh than its layer's; delete it and run again")
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point3;
+    use toile_avatar::{Picture, write_textured};
+
+    use super::*;
+
+    #[test]
+    fn a_layer_is_read_back_and_no_other_is_taken_for_it() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]].map(Point3::from);
+        let mesh = Mesh::new(corners.to_vec(), vec![[0, 1, 2], [2, 1, 3]]);
+        let source = [0, 1, 2, 3, 1, 2];
+        let shown = mesh.gather(&source, vec![[0, 1, 2], [5, 4, 3]]);
+        let uv = [[0.0, 0.0], [0.4, 0.0], [0.0, 0.4], [0.9, 0.9], [0.9, 0.5], [0.5, 0.9]];
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("layer.glb");
+        let picture = Picture::Jpeg(vec![0xff, 0xd8, 0xff]);
+        std::fs::write(&path, write_textured("top", &shown, &uv, &picture).unwrap()).unwrap();
+        let read = texture_of(&path, &mesh).unwrap();
+        assert_eq!((read.source.as_slice(), read.uv.as_slice()), (source.as_slice(), uv.as_slice()));
+        assert_eq!((read.triangles, read.base_color), (shown.triangles, picture));
+        let turned = Mesh::new(corners.to_vec(), vec![[0, 1, 2], [1, 3, 2]]);
+        assert!(texture_of(&path, &turned).unwrap_err().to_string().contains("another mesh"));
+        let fewer = Mesh::new(corners.to_vec(), vec![[0, 1, 2]]);
+        assert!(texture_of(&path, &fewer).unwrap_err().to_string().contains("another mesh"));
+    }
+}

@@ -253,3 +253,94 @@ fn coded(color: [f32; 3], seen: u8) -> [u8; 4] {
     let [r, g, b] = color.map(|c| (c + 0.5).clamp(0.0, 255.0) as u8);
     [r, g, b, seen]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{TextureSettings, unwrap};
+
+    /// A sheet of 0.4 m with a vertex every `step` metres, at height `z`, facing +Z.
+    fn sheet(step: f32, z: f32) -> Mesh {
+        let side = (0.4 / step).round() as usize + 1;
+        let point = |i: usize| Point3::new((i % side) as f32 * step, (i / side) as f32 * step, z);
+        let cell = |k: usize| {
+            let v = (k / (side - 1) * side + k % (side - 1)) as u32;
+            [[v, v + 1, v + side as u32], [v + 1, v + side as u32 + 1, v + side as u32]]
+        };
+        Mesh::new((0..side * side).map(point).collect(), (0..(side - 1) * (side - 1)).flat_map(cell).collect())
+    }
+
+    /// Stripes of 10 mm across x, a step of one along y.
+    fn own_color(p: &Point3<f32>) -> [u8; 3] {
+        let stripe = 128.0 + 100.0 * (std::f32::consts::TAU * p.x / 0.01).sin();
+        [stripe as u8, (p.y * 500.0) as u8, 40]
+    }
+
+    /// What the picture of 1024 texels over the sheet shows.
+    fn picture() -> Vec<[u8; 3]> {
+        let at = |i: usize| Point3::new((i % 1024) as f32 + 0.5, (i / 1024) as f32 + 0.5, 0.0) * (0.4 / 1024.0);
+        (0..1024 * 1024).map(|i| own_color(&at(i))).collect()
+    }
+
+    fn corners(mesh: &Mesh) -> Vec<[[f32; 2]; 3]> {
+        (0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| [p.x / 0.4, p.y / 0.4])).collect()
+    }
+
+    /// Texture of a sheet of other triangles, at `z`, and its atlas; triangles beyond x = 0.3 of the painted one may not be used.
+    fn carried(z: f32) -> (Mesh, Atlas, Texture) {
+        let (painted, pixels) = (sheet(0.02, 0.0), picture());
+        let is_usable: Vec<bool> = (0..painted.triangles.len()).map(|t| painted.corners(t)[0].x < 0.299).collect();
+        let mut mesh = sheet(0.016, z);
+        mesh.colors = vec![[7, 8, 9]; mesh.positions.len()];
+        let atlas = unwrap(&mesh, &TextureSettings { size: 1024, ..TextureSettings::default() }).unwrap();
+        let from = Painted {
+            mesh: &painted,
+            corners: &corners(&painted),
+            size: 1024,
+            pixels: &pixels,
+            seen: &vec![255; pixels.len()],
+            is_usable: &is_usable,
+        };
+        let texture = carry(&mesh, &atlas, &from, &CarrySettings { reach: 0.005 });
+        (mesh, atlas, texture)
+    }
+
+    /// Largest difference from the own colours inside of triangles up to x = 0.28, and the colour at the far end.
+    fn worst(mesh: &Mesh, atlas: &Atlas, texture: &Texture) -> (i32, [u8; 3]) {
+        let (mut worst, mut end) = (0, [0; 3]);
+        for (t, places) in atlas.triangles.iter().enumerate() {
+            let [a, b, c] = mesh.corners(t);
+            let p = Point3::from((a.coords + b.coords + c.coords) / 3.0);
+            let uv = [0, 1].map(|k| places.iter().map(|&v| atlas.uv[v as usize][k]).sum::<f32>() / 3.0);
+            let [x, y] = uv.map(|c| (c * 1024.0) as usize);
+            let found = texture.pixels[y * 1024 + x];
+            // A texel's middle is up to 0.3 mm aside: 20 of 255 where a stripe is steepest.
+            if p.x < 0.28 && (p.x / 0.01 % 0.5 - 0.25).abs() < 0.1 {
+                worst =
+                    worst.max((0..3).map(|k| (i32::from(found[k]) - i32::from(own_color(&p)[k])).abs()).max().unwrap());
+            }
+            if p.x > 0.35 {
+                end = found;
+            }
+        }
+        (worst, end)
+    }
+
+    #[test]
+    fn colours_stay_where_they_are_on_other_triangles() {
+        let (mesh, atlas, texture) = carried(0.001);
+        let (worst, end) = worst(&mesh, &atlas, &texture);
+        assert!(worst < 30, "{worst}");
+        assert_eq!(end, [7, 8, 9], "what may not be used gives no colour");
+        assert!((70.0..80.0).contains(&texture.report.seen_percent), "{}", texture.report.seen_percent);
+        assert!(texture.seen.contains(&255) && texture.seen.contains(&128));
+    }
+
+    #[test]
+    fn what_is_far_away_or_faces_away_gives_no_colour() {
+        assert_eq!(carried(0.011).2.report.seen_percent, 0.0);
+        let near = carried(0.0075).2;
+        let mixed = near.pixels.iter().filter(|p| p[2] > 15 && p[2] < 35).count();
+        assert!(mixed > near.pixels.len() / 4, "half-way both count half: {mixed}");
+    }
+}

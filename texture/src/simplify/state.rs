@@ -21,6 +21,7 @@ const SHRINK: f32 = 0.1;
 const SHARE: usize = 3;
 
 /// A surface while its edges are collapsed. Vertices are the surface's; wedges are the texture's vertices, one or more a vertex.
+#[derive(Clone)]
 pub(super) struct State<'a> {
     surface: &'a Seamed<'a>,
     positions: Vec<Point3<f64>>,
@@ -31,8 +32,10 @@ pub(super) struct State<'a> {
     /// Triangles at each vertex, dead ones among them.
     around: Vec<Vec<u32>>,
     quadrics: Vec<Quadric>,
-    /// How far the outlines of charts lie from where they were, by the wedges of their edges.
-    moved: HashMap<[u32; 2], f32>,
+    /// The wedges that sides of outlines of charts have passed over, by the wedges at their ends.
+    passed: HashMap<[u32; 2], Vec<u32>>,
+    /// How far an outline may lie from where it was.
+    pub room: f32,
     is_touched: Vec<bool>,
 }
 
@@ -42,6 +45,9 @@ struct Collapse {
     from: u32,
     onto: u32,
 }
+
+/// A side of an outline, and the wedges that it has passed over.
+type Passed = ([u32; 2], Vec<u32>);
 
 impl<'a> State<'a> {
     pub fn new(surface: &'a Seamed<'a>) -> Self {
@@ -54,7 +60,8 @@ impl<'a> State<'a> {
             alive: surface.triangles.len(),
             around: vec![Vec::new(); count],
             quadrics: vec![Quadric::default(); count],
-            moved: HashMap::new(),
+            passed: HashMap::new(),
+            room: surface.room,
             is_touched: vec![false; count],
         };
         for t in 0..state.triangles.len() {
@@ -192,7 +199,7 @@ impl<'a> State<'a> {
             return;
         }
         let Some(outlines) = self.outlines(c, &moves) else { return };
-        self.moved.extend(outlines);
+        self.passed.extend(outlines);
         for t in &shared {
             self.is_alive[*t as usize] = false;
         }
@@ -262,8 +269,8 @@ impl<'a> State<'a> {
         before == 0.0 || after * before.signum() > SHRINK * expected.abs()
     }
 
-    /// The new sides of outlines and how far they lie from where the outline was; `None` where that is farther than there is room for.
-    fn outlines(&self, c: Collapse, moves: &[[u32; 2]]) -> Option<Vec<([u32; 2], f32)>> {
+    /// The new sides of outlines and the wedges that they pass over; `None` where one of these is farther away than there is room for.
+    fn outlines(&self, c: Collapse, moves: &[[u32; 2]]) -> Option<Vec<Passed>> {
         let mut found = Vec::new();
         if self.surface.uv.is_empty() {
             return Some(found);
@@ -278,12 +285,12 @@ impl<'a> State<'a> {
                     if other == onto || !self.is_outline(side[0], side[1]) {
                         continue;
                     }
-                    let known = |a: u32, b: u32| self.moved.get(&sorted(a, b)).copied().unwrap_or(0.0);
-                    let off = self.off(from, other, onto) + known(from, other).max(known(from, onto));
-                    if off > self.surface.room {
+                    let known = |a: u32, b: u32| self.passed.get(&sorted(a, b)).into_iter().flatten().copied();
+                    let passed: Vec<u32> = known(from, other).chain(known(from, onto)).chain([from]).collect();
+                    if passed.iter().any(|&w| self.off(w, other, onto) > self.room) {
                         return None;
                     }
-                    found.push((sorted(other, onto), off));
+                    found.push((sorted(other, onto), passed));
                 }
             }
         }
