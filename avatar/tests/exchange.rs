@@ -5,7 +5,7 @@ mod common;
 
 use std::{path::Path, process::Command};
 
-use common::{PIXEL, dressed, textured};
+use common::{dressed, textured};
 use serde_json::Value;
 use toile_avatar::{Avatar, picture_name, write_mtl, write_obj, write_usda};
 use toile_character::{JOINT_COUNT, JointNaming};
@@ -103,6 +103,12 @@ fn understood(avatar: &Avatar, frame: usize) -> Option<Value> {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("avatar.usda");
     std::fs::write(&file, write_usda(avatar).unwrap()).unwrap();
+    for (layer, texture) in avatar.layers.iter().filter_map(|l| Some((&l.name, l.texture.as_ref()?))) {
+        let pictures = [("color", Some(&texture.base_color)), ("normal", texture.normal.as_ref())];
+        for (kind, picture) in pictures.iter().filter_map(|(kind, picture)| Some((kind, (*picture)?))) {
+            std::fs::write(dir.path().join(picture_name(layer, kind, picture)), picture.bytes()).unwrap();
+        }
+    }
     let done = Command::new("python3")
         .arg(top.join("tests/usd/check.py"))
         .arg(&file)
@@ -117,13 +123,6 @@ fn understood(avatar: &Avatar, frame: usize) -> Option<Value> {
 #[test]
 fn usd_itself_finds_the_textures() {
     let avatar = textured();
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    for layer in &avatar.layers {
-        let texture = layer.texture.as_ref().unwrap();
-        for (kind, picture) in [("color", &texture.base_color), ("normal", texture.normal.as_ref().unwrap())] {
-            std::fs::write(folder.join(picture_name(&layer.name, kind, picture)), PIXEL).unwrap();
-        }
-    }
     let text = write_usda(&avatar).unwrap();
     assert_eq!((text.matches("UsdPreviewSurface").count(), text.matches("primvars:displayColor").count()), (3, 0));
     let Some(found) = understood(&avatar, 5) else { return };

@@ -39,7 +39,8 @@ pub fn simplify(surface: &Seamed, targets: &[usize]) -> Vec<Vec<[u32; 3]>> {
         while state.alive > target && state.round(target) > 0 {}
         if state.alive > target {
             // From the start, so that the inside of charts is not used up first.
-            state = State { room: 2.0 * surface.room, ..before };
+            state = before;
+            state.room = 2.0 * surface.room;
             while state.alive > target && state.round(target) > 0 {}
         }
         state.triangles()
