@@ -5,27 +5,11 @@
 //! sides at once, as in Hoppe 1999 ("New quadric metric for simplifying meshes with appearance attributes"); one where three charts meet stays.
 
 mod cost;
+mod seamed;
 mod state;
 
-use nalgebra::Point3;
-
-use cost::Quadric;
+pub use seamed::Seamed;
 use state::State;
-
-/// A surface to simplify.
-#[derive(Debug, Clone, Copy)]
-pub struct Seamed<'a> {
-    /// Positions of its vertices, metres.
-    pub positions: &'a [Point3<f32>],
-    /// The vertex behind each of the texture's.
-    pub source: &'a [u32],
-    /// Place of each of the texture's vertices, 0 to 1; empty where there is no texture.
-    pub uv: &'a [[f32; 2]],
-    /// Triangles, in vertices of the texture.
-    pub triangles: &'a [[u32; 3]],
-    /// How far the outline of a chart may move, as a share of the picture's edge: half of what lies between charts.
-    pub room: f32,
-}
 
 /// Simplifies a surface to each of `targets` triangles, which fall; returns the triangles of each level, in vertices of the texture.
 ///
@@ -52,7 +36,7 @@ pub fn simplify(surface: &Seamed, targets: &[usize]) -> Vec<Vec<[u32; 3]>> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use nalgebra::Vector3;
+    use nalgebra::{Point3, Vector3};
     use toile_geometry::{Mesh, bvh::Bvh, topology::Edges};
 
     use super::*;

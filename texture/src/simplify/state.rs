@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use super::{Quadric, Seamed};
+use super::{cost::Quadric, seamed::Seamed};
 
 /// Weight of the planes that hold borders of the surface and of charts in place.
 const BORDER: f64 = 4.0;
