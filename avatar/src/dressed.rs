@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use toile_character::{JOINT_COUNT, JointNaming, Motion, Pose, Skeleton, SkinWeights, skinning};
 use toile_geometry::Mesh;
 
-use crate::AvatarError;
+use crate::{AvatarError, LayerTexture};
 
 /// A person's body and garments, each a skinned layer of its own, on one skeleton.
 #[derive(Debug, Clone)]
@@ -39,6 +39,8 @@ pub struct AvatarLayer {
     pub garment: Option<String>,
     /// Thickness of the cloth, metres, where it is known.
     pub thickness: Option<f32>,
+    /// Its texture; without one, files have the colours of the vertices.
+    pub texture: Option<LayerTexture>,
 }
 
 impl Avatar {
@@ -124,6 +126,9 @@ impl AvatarLayer {
                     "the skin weights of vertex {v} are {weights:?}; none may be negative and at least one must be above 0"
                 ));
             }
+        }
+        if let Some(reason) = self.texture.as_ref().and_then(|texture| texture.fault(&self.mesh)) {
+            return wrong(reason);
         }
         if self.thickness.is_some_and(|t| !t.is_finite() || t < 0.0) {
             return wrong("its thickness is not a length".into());

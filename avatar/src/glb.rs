@@ -2,14 +2,15 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::{Avatar, AvatarError, buffer::Buffer, clip::clip, layer_mesh, rig::Rig};
+use crate::{Avatar, AvatarError, buffer::Buffer, clip::clip, layer_mesh, material::Materials, rig::Rig};
 
 /// The program that wrote the file, for `asset.generator`.
 pub(crate) const GENERATOR: &str = concat!("Toile ", env!("CARGO_PKG_VERSION"));
 
 /// The avatar as a GLB file.
 ///
-/// One mesh node a layer, named as the layer, positions exactly as in the avatar's meshes (metres, +Y up); one
+/// One mesh node a layer, named as the layer, positions exactly as in the avatar's meshes (metres, +Y up), those of vertices on borders of a
+/// texture's charts once more behind them; one
 /// skin of 52 joint nodes, by default with VRM's names, that rest in `pose0`; one animation a motion. The same avatar gives the
 /// same bytes. A single layer makes a rigged scan.
 ///
@@ -32,9 +33,10 @@ pub fn write_glb(avatar: &Avatar) -> Result<Vec<u8>, AvatarError> {
 pub(crate) fn document(avatar: &Avatar, rig: &Rig, buffer: &mut Buffer) -> Map<String, Value> {
     let mut nodes = rig.nodes(avatar.joint_names);
     let first_mesh_node = nodes.len();
-    let mut meshes = Vec::new();
+    let (mut meshes, mut materials) = (Vec::new(), Materials::default());
     for (index, layer) in avatar.layers.iter().enumerate() {
         meshes.push(layer_mesh::layer_mesh(layer, index, buffer));
+        materials.add(layer, buffer);
         nodes.push(json!({
             "name": layer.name,
             "mesh": index,
@@ -51,13 +53,14 @@ pub(crate) fn document(avatar: &Avatar, rig: &Rig, buffer: &mut Buffer) -> Map<S
         "scenes": [{ "name": avatar.name, "nodes": roots }],
         "nodes": nodes,
         "meshes": meshes,
-        "materials": avatar.layers.iter().map(layer_mesh::material).collect::<Vec<_>>(),
         "skins": [skin],
     });
-    match parts {
+    let mut document = match parts {
         Value::Object(map) => map,
         _ => Map::new(),
-    }
+    };
+    materials.finish(&mut document);
+    document
 }
 
 /// The file, if its lengths fit the format's 32 bits.

@@ -1,12 +1,16 @@
-//! One layer as a glTF mesh: positions, normals, linear colours, skin weights, where it hangs free (`_FREE`), indices.
+//! One layer as a glTF mesh: positions, normals, places in its texture or linear colours, skin weights, where it hangs free (`_FREE`), indices.
+
+use std::borrow::Cow;
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use toile_character::{FREE_PART, SkinWeights};
+use toile_geometry::Mesh;
 
 use crate::{
     AvatarLayer,
     buffer::{Buffer, Shape, Target},
+    tangents,
 };
 
 /// The linear colour of a layer whose vertices have none.
@@ -14,17 +18,24 @@ pub(crate) const NEUTRAL: [f64; 3] = [0.6, 0.6, 0.6];
 
 /// Appends the layer's arrays to `buffer`; returns the glTF mesh, which uses material `material`.
 pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buffer) -> Value {
-    let mesh = &layer.mesh;
+    let drawn = layer.drawn();
+    let mesh = &drawn.mesh;
     let positions: Vec<f32> = mesh.positions.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
-    let normals = layer.normals();
-    let (joints, weights) = influences(&layer.weights);
+    let normals: Vec<[f32; 3]> = mesh.normals.iter().map(unit).collect();
+    let (joints, weights) = influences(&drawn.weights);
     let mut attributes = json!({
         "POSITION": buffer.add_bounded(&positions, Shape::Vec3, Target::Vertices),
         "NORMAL": buffer.add(normals.as_flattened(), Shape::Vec3, Target::Vertices),
         "JOINTS_0": buffer.add(&joints, Shape::Vec4, Target::Vertices),
         "WEIGHTS_0": buffer.add(&weights, Shape::Vec4, Target::Vertices),
     });
-    if !mesh.colors.is_empty() {
+    if let Some(texture) = &layer.texture {
+        attributes["TEXCOORD_0"] = json!(buffer.add(texture.uv.as_flattened(), Shape::Vec2, Target::Vertices));
+        if texture.normal.is_some() {
+            let tangents = tangents(mesh, &texture.uv);
+            attributes["TANGENT"] = json!(buffer.add(tangents.as_flattened(), Shape::Vec4, Target::Vertices));
+        }
+    } else if !mesh.colors.is_empty() {
         let colors = buffer.add(&linear_colors(&mesh.colors), Shape::Vec4, Target::Vertices);
         attributes["COLOR_0"] = json!(buffer.normalized(colors));
     }
@@ -42,23 +53,33 @@ pub(crate) fn layer_mesh(layer: &AvatarLayer, material: usize, buffer: &mut Buff
     })
 }
 
+/// A layer with the vertices that its files have.
+pub(crate) struct DrawnLayer<'a> {
+    /// With normals.
+    pub mesh: Cow<'a, Mesh>,
+    pub weights: Cow<'a, SkinWeights>,
+}
+
 impl AvatarLayer {
+    /// The layer with a texture's vertices where it has one, else with its own; normals are those of the whole surface, also along borders of charts.
+    pub(crate) fn drawn(&self) -> DrawnLayer<'_> {
+        let normals = if self.mesh.normals.is_empty() { self.mesh.vertex_normals() } else { self.mesh.normals.clone() };
+        let whole = Mesh { normals, ..self.mesh.clone() };
+        let Some(texture) = &self.texture else {
+            return DrawnLayer { mesh: Cow::Owned(whole), weights: Cow::Borrowed(&self.weights) };
+        };
+        DrawnLayer {
+            mesh: Cow::Owned(whole.gather(&texture.source, texture.triangles.clone())),
+            weights: Cow::Owned(self.weights.gather(&texture.source)),
+        }
+    }
+
     /// The normal of every vertex, of unit length.
     pub(crate) fn normals(&self) -> Vec<[f32; 3]> {
         let mesh = &self.mesh;
         let normals = if mesh.normals.is_empty() { mesh.vertex_normals() } else { mesh.normals.clone() };
         normals.iter().map(unit).collect()
     }
-}
-
-/// The material of a layer: matt, its colour from the vertices, both sides of cloth visible.
-pub(crate) fn material(layer: &AvatarLayer) -> Value {
-    let [r, g, b] = if layer.mesh.colors.is_empty() { NEUTRAL } else { [1.0; 3] };
-    json!({
-        "name": layer.name,
-        "doubleSided": layer.order > 0,
-        "pbrMetallicRoughness": { "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0 },
-    })
 }
 
 /// Facts that importers cannot know: order of dressing, type of garment, thickness, how much of it hangs free.

@@ -3,7 +3,7 @@
 //! - [`Avatar`]: skeleton, the pose that the layers are in, layers with their skin weights, motions;
 //! - [`write_glb`]: one mesh node a layer, one skin, one animation a motion; with a single layer, a rigged scan;
 //! - [`write_glb_with_helpers`]: the same with joints beside the skeleton's, which show one motion of layers that swing;
-//! - [`write_textured`]: one mesh with a texture, without bones;
+//! - [`write_textured`], [`read_textured`]: one mesh with a texture, without bones;
 //! - [`write_vrm`]: the same baked to a T-pose, with bones and terms of use named, and with springs where parts hang loose;
 //! - [`write_usda`]: layers, skeleton and motions as USD text;
 //! - [`write_obj`], [`write_mtl`]: the layers at rest as OBJ;
@@ -30,6 +30,7 @@
 //!         order: 0,
 //!         garment: None,
 //!         thickness: None,
+//!         texture: None,
 //!     }],
 //!     motions: Vec::new(),
 //! };
@@ -45,11 +46,15 @@ mod error;
 mod glb;
 mod helpers;
 mod layer_mesh;
+mod layer_texture;
+mod material;
 mod motion;
 mod obj;
+mod picture;
 mod point_cache;
 mod rig;
 mod springs;
+mod tangents;
 mod textured;
 mod usda;
 mod vrm;
@@ -59,9 +64,12 @@ pub use dressed::{Avatar, AvatarLayer};
 pub use error::AvatarError;
 pub use glb::write_glb;
 pub use helpers::{HelperJoints, write_glb_with_helpers};
+pub use layer_texture::LayerTexture;
 pub use motion::{FileMotion, MotionJoint, read_motion};
-pub use obj::{write_mtl, write_obj};
+pub use obj::{picture_name, write_mtl, write_obj};
+pub use picture::Picture;
 pub use point_cache::PointCache;
-pub use textured::{Picture, write_textured};
+pub use tangents::tangents;
+pub use textured::{read_textured, write_textured};
 pub use usda::write_usda;
 pub use vrm::{AvatarPermission, CommercialUsage, VrmMeta, vrm_pose, write_vrm};

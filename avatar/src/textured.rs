@@ -1,40 +1,16 @@
 //! A mesh with a texture, without bones: a scan as binary glTF 2.0.
 
+use nalgebra::{Point3, Vector3};
 use serde_json::{Map, Value, json};
 use toile_geometry::Mesh;
 
 use crate::{
-    AvatarError,
+    AvatarError, Picture,
     buffer::{Buffer, Shape, Target},
     glb::{GENERATOR, finish},
     layer_mesh::{indices, unit},
+    material::sampler,
 };
-
-/// A picture as a file's bytes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Picture {
-    /// A JPEG file.
-    Jpeg(Vec<u8>),
-    /// A PNG file.
-    Png(Vec<u8>),
-}
-
-impl Picture {
-    /// The file.
-    pub fn bytes(&self) -> &[u8] {
-        match self {
-            Self::Jpeg(bytes) | Self::Png(bytes) => bytes,
-        }
-    }
-
-    /// Its media type.
-    pub fn mime(&self) -> &'static str {
-        match self {
-            Self::Jpeg(_) => "image/jpeg",
-            Self::Png(_) => "image/png",
-        }
-    }
-}
 
 /// A mesh with a texture as a GLB file: one node called `name`, positions as they are (metres, +Y up), `uv` a vertex (0 to 1, down).
 ///
@@ -69,8 +45,7 @@ pub fn write_textured(name: &str, mesh: &Mesh, uv: &[[f32; 2]], picture: &Pictur
             "baseColorTexture": { "index": 0 }, "metallicFactor": 0.0, "roughnessFactor": 1.0,
         } }],
         "textures": [{ "source": 0, "sampler": 0 }],
-        // Linear with mip levels; nothing repeats.
-        "samplers": [{ "magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071 }],
+        "samplers": [sampler()],
         "images": [{ "name": name, "bufferView": view, "mimeType": picture.mime() }],
     });
     let document = match parts {
@@ -78,6 +53,38 @@ pub fn write_textured(name: &str, mesh: &Mesh, uv: &[[f32; 2]], picture: &Pictur
         _ => Map::new(),
     };
     finish(buffer, document)
+}
+
+/// A mesh with its texture, back from a GLB file that [`write_textured`] wrote: positions, normals and triangles, places in the texture, the
+/// picture.
+///
+/// # Errors
+/// [`AvatarError::Avatar`] where it is not such a file.
+pub fn read_textured(bytes: &[u8]) -> Result<(Mesh, Vec<[f32; 2]>, Picture), AvatarError> {
+    let lacks = |what: &str| AvatarError::Avatar(format!("it is no mesh with a texture as Toile writes them: {what}"));
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(bytes).map_err(|e| lacks(&e.to_string()))?;
+    let blob = blob.ok_or_else(|| lacks("it has no binary part"))?;
+    let mesh = document.meshes().next().ok_or_else(|| lacks("it has no mesh"))?;
+    let primitive = mesh.primitives().next().ok_or_else(|| lacks("it has no triangles"))?;
+    let reader = primitive.reader(|_| Some(&blob));
+    let positions: Vec<Point3<f32>> =
+        reader.read_positions().ok_or_else(|| lacks("it has no positions"))?.map(Point3::from).collect();
+    let normals = reader.read_normals().map_or_else(Vec::new, |n| n.map(Vector3::from).collect());
+    let uv: Vec<[f32; 2]> =
+        reader.read_tex_coords(0).ok_or_else(|| lacks("it has no places in a texture"))?.into_f32().collect();
+    let corners: Vec<u32> = reader.read_indices().ok_or_else(|| lacks("it has no indices"))?.into_u32().collect();
+    let image = document.images().next().ok_or_else(|| lacks("it has no picture"))?;
+    let gltf::image::Source::View { view, mime_type } = image.source() else {
+        return Err(lacks("its picture is not in it"));
+    };
+    let file = blob.get(view.offset()..view.offset() + view.length()).ok_or_else(|| lacks("its picture is cut off"))?;
+    let picture = if mime_type == "image/png" { Picture::Png(file.to_vec()) } else { Picture::Jpeg(file.to_vec()) };
+    let mesh = Mesh { normals, ..Mesh::new(positions, corners.as_chunks().0.to_vec()) };
+    mesh.validate().map_err(|e| lacks(&e.to_string()))?;
+    if uv.len() != mesh.positions.len() {
+        return Err(lacks("its places in the texture are not as many as its vertices"));
+    }
+    Ok((mesh, uv, picture))
 }
 
 #[cfg(test)]
@@ -97,5 +104,18 @@ mod tests {
         let text = String::from_utf8_lossy(&glb);
         assert!(text.contains("TEXCOORD_0") && text.contains("image/jpeg"));
         assert_eq!(glb.len() % 4, 0);
+    }
+
+    #[test]
+    fn what_was_written_is_read_back() {
+        let corners = [[0.0, 0.5, 0.0], [1.0, 0.1, 0.3], [0.0, 1.0, 0.0]].map(Point3::from);
+        let mesh = Mesh::new(corners.to_vec(), vec![[0, 1, 2]]);
+        let (uv, picture) = ([[0.0, 0.25], [0.75, 0.1], [1.0, 1.0]], Picture::Jpeg(vec![0xff, 0xd8, 0xff]));
+        let glb = write_textured("scan", &mesh, &uv, &picture).unwrap();
+        let (read, places, read_picture) = read_textured(&glb).unwrap();
+        assert_eq!((read.positions, read.triangles), (mesh.positions.clone(), mesh.triangles));
+        assert_eq!((places.as_slice(), read_picture), (uv.as_slice(), picture));
+        assert!(read_textured(&glb[..glb.len() / 2]).is_err());
+        assert!(read_textured(b"glTF").unwrap_err().to_string().contains("no mesh with a texture"));
     }
 }

@@ -5,6 +5,7 @@
 
 mod animation;
 mod layer;
+mod material;
 mod names;
 mod skeleton;
 mod text;
@@ -13,7 +14,7 @@ use crate::{Avatar, AvatarError, glb::GENERATOR};
 use names::Names;
 
 /// The avatar as a USDA file: metres, +Y up; one `SkelRoot` that holds a `Skeleton` of 52 joints which rest in `pose0`, a `Mesh` a
-/// layer with normals, display colours (linear, as USD has them) and four influences a vertex, and a `SkelAnimation` a motion, of
+/// layer with normals, its texture (pictures lie beside, called as [`crate::picture_name`] says) or display colours (linear, as USD has them) and four influences a vertex, and a `SkelAnimation` a motion, of
 /// which the first plays: a time code a pose.
 ///
 /// Prims are called as layers, motions and joints are, with `_` in place of what USD's names do not allow; `customData.name`

@@ -5,9 +5,9 @@ mod common;
 
 use std::{path::Path, process::Command};
 
-use common::dressed;
+use common::{dressed, textured};
 use serde_json::Value;
-use toile_avatar::{Avatar, write_mtl, write_obj, write_usda};
+use toile_avatar::{Avatar, picture_name, write_mtl, write_obj, write_usda};
 use toile_character::{JOINT_COUNT, JointNaming};
 use toile_geometry::obj;
 
@@ -41,6 +41,29 @@ fn an_obj_file_has_every_layer_as_it_is() {
     assert!(normals.iter().all(|n| (length(n) - 1.0).abs() < 1e-5));
     let materials = write_mtl(&avatar);
     assert!(words("o ").iter().all(|name| materials.contains(&format!("newmtl {name}\n"))));
+}
+
+#[test]
+fn a_texture_in_an_obj_file_needs_no_vertex_twice() {
+    let avatar = textured();
+    let text = write_obj(&avatar, "a.mtl").unwrap();
+    let read = obj::decode(text.as_bytes()).unwrap();
+    assert_eq!((read.positions.len(), read.colors.len()), (vertices(&avatar), 0));
+    let places: usize = avatar.layers.iter().map(|l| l.texture.as_ref().unwrap().uv.len()).sum();
+    let lines = |key: &str| text.lines().filter_map(|l| l.strip_prefix(key)).map(String::from).collect::<Vec<_>>();
+    assert_eq!(lines("vt ").len(), places);
+    assert!(places > vertices(&avatar), "there are seams");
+    // The last face of all names the last layer's places, upwards.
+    let (layer, face) = (&avatar.layers[2], lines("f ").pop().unwrap());
+    let texture = layer.texture.as_ref().unwrap();
+    let corner = face.split(' ').next_back().unwrap();
+    let number: usize = corner.split('/').nth(1).unwrap().parse().unwrap();
+    let [u, v] = texture.uv[texture.triangles[texture.triangles.len() - 1][2] as usize];
+    assert_eq!(lines("vt ")[number - 1], format!("{u} {}", 1.0 - v));
+    let materials = write_mtl(&avatar);
+    assert!(
+        materials.contains("map_Kd avatar-02-top-color.png\n") && materials.contains("norm avatar-02-top-normal.png\n")
+    );
 }
 
 #[test]
@@ -80,6 +103,12 @@ fn understood(avatar: &Avatar, frame: usize) -> Option<Value> {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("avatar.usda");
     std::fs::write(&file, write_usda(avatar).unwrap()).unwrap();
+    for (layer, texture) in avatar.layers.iter().filter_map(|l| Some((&l.name, l.texture.as_ref()?))) {
+        let pictures = [("color", Some(&texture.base_color)), ("normal", texture.normal.as_ref())];
+        for (kind, picture) in pictures.iter().filter_map(|(kind, picture)| Some((kind, (*picture)?))) {
+            std::fs::write(dir.path().join(picture_name(layer, kind, picture)), picture.bytes()).unwrap();
+        }
+    }
     let done = Command::new("python3")
         .arg(top.join("tests/usd/check.py"))
         .arg(&file)
@@ -89,6 +118,15 @@ fn understood(avatar: &Avatar, frame: usize) -> Option<Value> {
         .unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     Some(serde_json::from_slice(&done.stdout).unwrap())
+}
+
+#[test]
+fn usd_itself_finds_the_textures() {
+    let avatar = textured();
+    let text = write_usda(&avatar).unwrap();
+    assert_eq!((text.matches("UsdPreviewSurface").count(), text.matches("primvars:displayColor").count()), (3, 0));
+    let Some(found) = understood(&avatar, 5) else { return };
+    assert_eq!(found["issues"], Value::Array(Vec::new()), "USD's validators");
 }
 
 #[test]

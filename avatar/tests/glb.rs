@@ -291,3 +291,33 @@ fn what_no_file_can_be_made_of_is_refused() {
     assert!(refused(|a| a.motions.push(a.motions[0].clone())).contains("second motion"));
     assert!(refused(|a| a.motions[0].poses[2] = Pose { rotations: vec![], ..Pose::identity() }).contains("pose 2"));
 }
+
+#[test]
+fn a_texture_takes_the_place_of_colours_and_repeats_vertices_behind_the_others() {
+    let avatar = common::textured();
+    let bytes = write_glb(&avatar).unwrap();
+    let file = import(&bytes);
+    for layer in &avatar.layers {
+        let texture = layer.texture.as_ref().unwrap();
+        let node = mesh_node(&file, &layer.name);
+        let primitive = node.mesh().unwrap().primitives().next().unwrap();
+        let reader = primitive.reader(|b| file.1.get(b.index()).map(|d| d.0.as_slice()));
+        let positions: Vec<Point3<f32>> = reader.read_positions().unwrap().map(Point3::from).collect();
+        let count = layer.mesh.positions.len();
+        assert_eq!(positions[..count], layer.mesh.positions, "the mesh's own come first");
+        assert!(positions.len() > count && positions.len() == texture.source.len());
+        assert!((count..positions.len()).all(|v| positions[v] == layer.mesh.positions[texture.source[v] as usize]));
+        assert_eq!(reader.read_tex_coords(0).unwrap().into_f32().collect::<Vec<_>>(), texture.uv);
+        assert!(reader.read_colors(0).is_none(), "colours would tint the texture");
+        let normals: Vec<_> = reader.read_normals().unwrap().collect();
+        assert!((count..positions.len()).all(|v| normals[v] == normals[texture.source[v] as usize]), "no seam is seen");
+        let square = |t: &[f32; 4], n: &[f32; 3]| (0..3).map(|k| t[k] * n[k]).sum::<f32>().abs() < 1e-3;
+        assert!(reader.read_tangents().unwrap().zip(&normals).all(|(t, n)| square(&t, n) && t[3].abs() == 1.0));
+        let material = primitive.material();
+        assert!(material.normal_texture().is_some());
+        assert!(material.pbr_metallic_roughness().base_color_texture().is_some());
+    }
+    let mut plain = avatar;
+    plain.layers[0].texture.as_mut().unwrap().triangles.pop();
+    assert!(write_glb(&plain).unwrap_err().to_string().contains("triangles of its texture"));
+}

@@ -37,6 +37,7 @@ fn pyramid() -> Avatar {
             order: 0,
             garment: None,
             thickness: None,
+            texture: None,
         }],
         motions: Vec::new(),
     }

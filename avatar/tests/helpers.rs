@@ -181,14 +181,18 @@ fn khronos_validator_finds_nothing() {
     if toile_outside::file(&modules.join("gltf-validator")).is_none() {
         return;
     }
-    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("motion.glb");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let (file, textured) = (folder.join("motion.glb"), folder.join("textured.glb"));
     fs::write(&file, write_glb_with_helpers(&avatar, &helpers).unwrap()).unwrap();
+    fs::write(&textured, write_glb(&common::textured()).unwrap()).unwrap();
     let script = root.join("tests/validate_gltf.cjs");
-    let done = Command::new("node").arg(script).arg(&file).env("NODE_PATH", &modules).output().unwrap();
+    let done = Command::new("node").arg(script).args([&file, &textured]).env("NODE_PATH", &modules).output().unwrap();
     let report: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
     let issues = &report[file.to_str().unwrap()];
     assert_eq!((&issues["errors"], &issues["warnings"]), (&0.into(), &0.into()), "{}", issues["messages"]);
     assert_eq!(issues["info"]["animationCount"], 1);
+    let issues = &report[textured.to_str().unwrap()];
+    assert_eq!((&issues["errors"], &issues["warnings"]), (&0.into(), &0.into()), "{}", issues["messages"]);
 }
 
 #[test]

@@ -15,7 +15,7 @@ use crate::{
     PipelineError,
     folders::Folders,
     formats::FileFormat,
-    json, motion,
+    json, levels, motion,
     options::{HiddenChoice, MotionChoice, Options, Springs},
 };
 
@@ -41,6 +41,9 @@ pub struct AvatarChoice {
     /// The formats that it is written in beside GLB and VRM.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub formats: Vec<FileFormat>,
+    /// The levels of detail that it is also written in, triangles a layer, falling.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<usize>,
 }
 
 impl AvatarChoice {
@@ -72,6 +75,11 @@ impl AvatarChoice {
         }
         if let Some(asked) = &options.formats {
             choice.formats = FileFormat::beside_usual(asked);
+        }
+        if let Some(asked) = &options.levels {
+            choice.levels.clone_from(asked);
+            choice.levels.sort_unstable_by(|a, b| b.cmp(a));
+            choice.levels.dedup();
         }
         choice.springs = options.springs.or(choice.springs);
         choice.joint_names = options.joint_names.unwrap_or(choice.joint_names);
@@ -125,7 +133,11 @@ impl AvatarChoice {
         let generic = self.generic.then(|| "generic garments (--generic=off for those that were cut)".to_string());
         let part = (self.part == Part::Body)
             .then(|| "a body that gives way to tight garments (--part cloth for cloth that does)".to_string());
-        [motion, hidden, names, springs, generic, part, formats].into_iter().flatten().collect()
+        let levels = (!self.levels.is_empty()).then(|| {
+            let names: Vec<String> = self.levels.iter().map(|&n| levels::file_name(n)).collect();
+            format!("levels of detail as {} (`toile export --lod off` for none)", names.join(", "))
+        });
+        [motion, hidden, names, springs, generic, part, formats, levels].into_iter().flatten().collect()
     }
 }
 

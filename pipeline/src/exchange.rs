@@ -2,34 +2,78 @@
 
 use std::{
     collections::BTreeMap,
+    io::Read,
     path::{Path, PathBuf},
 };
 
 use toile_animation::{Bvh, bvh};
-use toile_avatar::{Avatar, AvatarError, AvatarLayer, write_mtl, write_obj, write_usda};
+use toile_avatar::{Avatar, AvatarError, AvatarLayer, Picture, picture_name, write_mtl, write_obj, write_usda};
+use toile_capture::files::open_regular;
 use toile_geometry::Mesh;
 
 use crate::{folders::Folders, formats::FileFormat, hash, meshes::encode_skinned};
 
 /// The file of the materials, as the OBJ file names it.
 const MATERIALS: &str = "avatar.mtl";
+/// What the names of pictures say that give the colour.
+const COLOR: &str = "color";
+/// The first bytes of a layer's file, which say what its picture is.
+const HEAD: u64 = 16 << 10;
 
 /// The files of `formats` for an avatar with these `layers`.
-pub(crate) fn paths(folders: &Folders, formats: &[FileFormat], layers: &[&str]) -> Vec<PathBuf> {
+///
+/// `textured` are the layers that have a texture, with the files that it is in.
+pub(crate) fn paths(
+    folders: &Folders,
+    formats: &[FileFormat],
+    layers: &[&str],
+    textured: &[(&str, PathBuf)],
+) -> Vec<PathBuf> {
     let of_format = |format: &FileFormat| match format {
         FileFormat::Glb | FileFormat::Vrm => Vec::new(),
         FileFormat::Obj => vec![folders.avatar_as("obj"), folders.root.join(MATERIALS)],
         FileFormat::Ply => layers.iter().map(|layer| folders.avatar_layer(layer)).collect(),
         FileFormat::Bvh | FileFormat::Usda => vec![folders.avatar_as(format.name())],
     };
-    formats.iter().flat_map(of_format).collect()
+    let mut paths: Vec<PathBuf> = formats.iter().flat_map(of_format).collect();
+    if refer_to_pictures(formats) {
+        paths.extend(textured.iter().map(|(name, path)| {
+            let kind = if is_png(path) { Picture::Png(Vec::new()) } else { Picture::Jpeg(Vec::new()) };
+            folders.root.join(picture_name(name, COLOR, &kind))
+        }));
+    }
+    paths
+}
+
+/// Whether files of these formats name pictures that lie beside.
+fn refer_to_pictures(formats: &[FileFormat]) -> bool {
+    formats.iter().any(|format| matches!(format, FileFormat::Obj | FileFormat::Usda))
+}
+
+/// The pictures of all layers that have a texture.
+pub(crate) fn pictures(avatar: &Avatar) -> Vec<Picture> {
+    avatar.layers.iter().filter_map(|layer| Some(layer.texture.as_ref()?.base_color.clone())).collect()
+}
+
+/// Whether the picture in a layer's file is a PNG, by what stands before its binary part.
+fn is_png(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let read = open_regular(path).ok().and_then(|file| file.take(HEAD).read_to_end(&mut head).ok());
+    read.is_some() && String::from_utf8_lossy(&head).contains("image/png")
 }
 
 /// What belongs into [`paths`], in their order. A layer of which nothing is left has an empty mesh.
 ///
 /// # Errors
 /// [`AvatarError`] where the avatar breaks a rule.
-pub(crate) fn contents(avatar: &Avatar, formats: &[FileFormat], layers: &[&str]) -> Result<Vec<Vec<u8>>, AvatarError> {
+///
+/// `pictures` are those of [`pictures`] before anything was left out of the avatar.
+pub(crate) fn contents(
+    avatar: &Avatar,
+    formats: &[FileFormat],
+    layers: &[&str],
+    pictures: &[Picture],
+) -> Result<Vec<Vec<u8>>, AvatarError> {
     let mut files = Vec::new();
     for format in formats {
         match format {
@@ -41,6 +85,9 @@ pub(crate) fn contents(avatar: &Avatar, formats: &[FileFormat], layers: &[&str])
             FileFormat::Bvh => files.push(motion(avatar)?),
             FileFormat::Usda => files.push(write_usda(avatar)?.into_bytes()),
         }
+    }
+    if refer_to_pictures(formats) {
+        files.extend(pictures.iter().map(|picture| picture.bytes().to_vec()));
     }
     Ok(files)
 }

@@ -123,6 +123,16 @@ impl Folders {
         self.worn(label).join("worn.json")
     }
 
+    /// The garment as it is in [`Folders::garment`], with a texture of its own; there is none without colour pictures.
+    pub fn garment_layer(&self, layer: &str) -> PathBuf {
+        self.layer(layer).join("layer.glb")
+    }
+
+    /// The same of the body, on the places that its template has in all textures.
+    pub fn body_layer(&self) -> PathBuf {
+        self.body().join("layer.glb")
+    }
+
     /// The fitted body.
     pub fn body(&self) -> PathBuf {
         self.build().join("body")

@@ -141,7 +141,8 @@ mod tests {
         (0..3).for_each(|_| weights.push(&[(0, 1.0)]));
         let corners = [[0.0, 1.0, 0.0], [0.1, 1.0, 0.0], [0.0, 1.1, 0.0]].map(Point3::from);
         let mesh = Mesh::new(corners.to_vec(), vec![[0, 1, 2]]);
-        let layer = AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None };
+        let layer =
+            AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None, texture: None };
         let (name, joint_names, pose0) = ("anna".into(), JointNaming::Vrm, Pose::identity());
         let avatar = Avatar { name, skeleton, joint_names, pose0, layers: vec![layer], motions: vec![walk] };
         let glb = write_glb(&avatar).unwrap();

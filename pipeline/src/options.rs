@@ -41,6 +41,8 @@ pub struct Options {
     pub part: Option<Part>,
     /// The formats that the avatar is written in beside GLB and VRM; without, as before.
     pub formats: Option<Vec<FileFormat>>,
+    /// The levels of detail that the avatar is also written in, triangles a layer; without, as before.
+    pub levels: Option<Vec<usize>>,
     /// Stop after this layer; without, all of them.
     pub last_layer: Option<String>,
     /// A file of settings beside the subject's own `toile.toml`.

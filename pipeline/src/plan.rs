@@ -18,6 +18,7 @@ use crate::{
     options::Options,
     record,
     resume::read_timings,
+    scan_texture::ScanTexture,
     steps::STEPS,
     ticket::{Ticket, step_folders},
     worn::listed,
@@ -205,6 +206,12 @@ fn expected(subject: &Subject, folders: &Folders) -> Result<Vec<Expected>, Pipel
         add(&worn.label, "wear", last);
     }
     add("layers", "stack", last);
+    // Where the take has a texture, so has the layer.
+    let mut textured = layers.iter().enumerate().filter(|(_, layer)| ScanTexture::is_there(folders, layer)).peekable();
+    if textured.peek().is_some_and(|(number, _)| *number == 0) {
+        add("body", "layer-texture", last);
+    }
+    textured.filter(|(number, _)| dressed || *number > 0).for_each(|(_, layer)| add(layer, "layer-texture", last));
     add("avatar", "export", last);
     add("report", "report", last);
     Ok(steps)

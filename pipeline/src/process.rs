@@ -21,6 +21,7 @@ use crate::{
         fit::Fit,
         fuse::Fuse,
         generic::Generic,
+        layer_texture::LayerTexturing,
         page::Page,
         pose::PoseUnder,
         read_scan::ReadScan,
@@ -111,6 +112,9 @@ fn to_body(run: &Run, goal: Goal, options: &Options, summary: &mut Summary) -> R
     let body = Body::load(folders, run.first_layer(), &model)?;
     let choice = AvatarChoice::choose_cloth(folders, options)?;
     let garments = dress(run, &model, &body, &choice, summary)?;
+    for step in LayerTexturing::of_layers(run, &model, &garments)? {
+        summary.hear(run.step(&step)?);
+    }
     summary.files = garments.iter().map(|g| folders.garment(&g.layer)).collect();
     if goal == Goal::Garments { Ok(()) } else { deliver(run, &body, &garments, goal, options, summary) }
 }
@@ -219,7 +223,10 @@ fn seconds(run: &Run, goal: Goal) -> f64 {
     let costs = [
         (Goal::Scans, takes * (Fuse::SECONDS + Texturing::SECONDS)),
         (Goal::Body, Fit::SECONDS),
-        (Goal::Garments, garments * (PoseUnder::SECONDS + Cut::SECONDS + Stack::SECONDS)),
+        (
+            Goal::Garments,
+            garments * (PoseUnder::SECONDS + Cut::SECONDS + Stack::SECONDS) + takes * LayerTexturing::SECONDS,
+        ),
         (Goal::Avatar, Export::SECONDS),
         (Goal::Report, Page::SECONDS),
     ];

@@ -25,6 +25,7 @@ pub fn rigged_scan(
         order: 0,
         garment: None,
         thickness: None,
+        texture: None,
     };
     let avatar = Avatar {
         name: "rigged scan".into(),

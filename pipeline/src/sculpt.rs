@@ -64,7 +64,8 @@ pub fn sculpt(root: &Path, settings_file: Option<&Path>, observer: &dyn Observer
     let posed = body.skinned.posed_mesh(&body.pose0);
     let weights = closest_triangle_weights(&posed, &body.skinned.weights, &mesh.positions);
     let walk = motion::load(None, &body.skinned, &run.settings.motion)?.motion;
-    let layer = AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None };
+    let layer =
+        AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None, texture: None };
     let avatar = Avatar {
         name: run.title().to_string(),
         skeleton: body.skinned.skeleton.clone(),

@@ -143,7 +143,8 @@ impl SculptFile {
         mesh.recompute_normals();
         let template = Mesh::new(self.template(), self.model.triangles.clone());
         let weights = closest_triangle_weights(&template, &self.model.weights, &mesh.positions);
-        let layer = AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None };
+        let layer =
+            AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None, texture: None };
         let avatar = Avatar {
             name: self.body.name.clone(),
             skeleton: self.body.skeleton.clone(),

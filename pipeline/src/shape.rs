@@ -157,7 +157,8 @@ fn on_its_soles(shaped: &Shaped, pose0: &Pose, before: &Mesh) -> Pose {
 /// The body alone as an avatar in `pose0`.
 fn bare(shaped: &Shaped, name: &str, pose0: Pose) -> Avatar {
     let (mesh, weights) = (shaped.body.posed_mesh(&pose0), shaped.body.weights.clone());
-    let layer = AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None };
+    let layer =
+        AvatarLayer { name: "body".into(), mesh, weights, order: 0, garment: None, thickness: None, texture: None };
     Avatar {
         name: name.to_string(),
         skeleton: shaped.body.skeleton.clone(),

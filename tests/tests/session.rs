@@ -297,6 +297,33 @@ fn further_formats_are_written_remembered_and_removed() {
 }
 
 #[test]
+fn levels_of_detail_have_textures_and_relief_and_go_again() {
+    let (_dir, subject) = copied(demo());
+    let run = |lod: &str| {
+        let output = toile(&["export", subject.to_str().unwrap(), "--lod", lod, "--json"]).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+    };
+    run("6k,4k");
+    for (name, most) in [("avatar-6k.glb", 6000), ("avatar-4k.glb", 4000)] {
+        let gltf = glb_json(&subject.join(name));
+        let list = |key: &str| gltf[key].as_array().unwrap().clone();
+        for mesh in list("meshes") {
+            let primitive = &mesh["primitives"][0];
+            let corners = list("accessors")[primitive["indices"].as_u64().unwrap() as usize]["count"].as_u64().unwrap();
+            assert!(corners / 3 <= most, "{name} {}: {} triangles", mesh["name"], corners / 3);
+            let attributes = &primitive["attributes"];
+            assert!(["TEXCOORD_0", "TANGENT", "JOINTS_0"].iter().all(|a| attributes.get(a).is_some()), "{attributes}");
+            assert!(attributes.get("COLOR_0").is_none());
+        }
+        let textured =
+            |m: &Value| m["pbrMetallicRoughness"].get("baseColorTexture").is_some() && m.get("normalTexture").is_some();
+        assert!(list("materials").iter().all(textured));
+    }
+    run("off");
+    assert!(!subject.join("avatar-6k.glb").exists() && subject.join("avatar.glb").exists());
+}
+
+#[test]
 fn khronos_validator_finds_nothing() {
     let subject = demo();
     let modules = workspace().join("target/outside/node_modules");

@@ -39,7 +39,7 @@ def main():
                 "vertices": len(points),
                 "triangles": len(mesh.GetFaceVertexCountsAttr().Get()),
                 "normals": len(mesh.GetNormalsAttr().Get()),
-                "color": list(color[0]),
+                "color": list(color[0]) if color else None,
                 "points": [list(p) for p in points[::every]],
             }
     json.dump(

@@ -46,6 +46,31 @@ impl Atlas {
         atlas
     }
 
+    /// The same atlas for a picture of another size.
+    pub fn sized(self, size: u32) -> Self {
+        Self { size, ..self }
+    }
+
+    /// The same atlas with the mesh's `vertices` first and in their order, so that what is known of them stays true of the atlas; those that
+    /// stand again beyond a border of charts follow.
+    pub fn in_order(self, vertices: usize) -> Self {
+        let mut new_of_old = vec![u32::MAX; self.source.len()];
+        let (mut source, mut uv) = ((0..vertices as u32).collect::<Vec<_>>(), vec![[0.0; 2]; vertices]);
+        let mut is_taken = vec![false; vertices];
+        for (old, &v) in self.source.iter().enumerate() {
+            let is_again = std::mem::replace(&mut is_taken[v as usize], true);
+            new_of_old[old] = if is_again { source.len() as u32 } else { v };
+            if is_again {
+                source.push(v);
+                uv.push(self.uv[old]);
+            } else {
+                uv[v as usize] = self.uv[old];
+            }
+        }
+        let triangles = self.triangles.iter().map(|t| t.map(|v| new_of_old[v as usize])).collect();
+        Self { source, uv, triangles, ..self }
+    }
+
     /// Corners of a triangle in texels: (0, 0) is the outer corner of the first one.
     pub(crate) fn texels(&self, triangle: usize) -> [[f32; 2]; 3] {
         let size = self.size as f32;

@@ -21,9 +21,18 @@ const ROUNDS: usize = 6;
 /// # Errors
 /// [`TextureError::Unwrap`] where the charts do not fit into the picture.
 pub fn unwrap(mesh: &Mesh, settings: &TextureSettings) -> Result<Atlas, TextureError> {
+    unwrap_from(mesh, &[], settings)
+}
+
+/// As [`unwrap`], with charts that begin at the triangles `first`, one after the other, before any other: what must not be cut by a border lies around
+/// one of them.
+///
+/// # Errors
+/// As [`unwrap`].
+pub fn unwrap_from(mesh: &Mesh, first: &[u32], settings: &TextureSettings) -> Result<Atlas, TextureError> {
     settings.check()?;
     let faces = Faces::new(mesh);
-    let all: Vec<u32> = (0..mesh.triangles.len() as u32).collect();
+    let all: Vec<u32> = first.iter().copied().chain(0..mesh.triangles.len() as u32).collect();
     let mut charts = faces.charts(&all);
     let mut finest = f32::MAX;
     for _ in 0..ROUNDS {

@@ -1,6 +1,9 @@
 //! A layer as a skinned `Mesh`.
 
-use super::text::{array, extent, string, tuple};
+use super::{
+    material,
+    text::{array, extent, string, tuple},
+};
 use crate::{
     AvatarLayer,
     layer_mesh::{NEUTRAL, influences, linear_of_srgb},
@@ -12,14 +15,15 @@ pub(super) fn layer(layer: &AvatarLayer, name: &str) -> String {
     let (joints, weights) = influences(&layer.weights);
     let points = mesh.positions.iter().map(|p| tuple(p.iter()));
     format!(
-        "    def Mesh \"{name}\" (\n        prepend apiSchemas = [\"SkelBindingAPI\"]\n        customData = {{\n{}        }}\n    )\n    {{\n        \
+        "    def Mesh \"{name}\" (\n        prepend apiSchemas = [{}]\n        customData = {{\n{}        }}\n    )\n    {{\n        \
          uniform bool doubleSided = {}\n        uniform token subdivisionScheme = \"none\"\n        float3[] extent = {}\n        \
          int[] faceVertexCounts = {}\n        int[] faceVertexIndices = {}\n        point3f[] points = {}\n        \
          normal3f[] normals = {} (\n            interpolation = \"vertex\"\n        )\n{}        \
          matrix4d primvars:skel:geomBindTransform = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))\n        \
          int[] primvars:skel:jointIndices = {} (\n            elementSize = 4\n            interpolation = \"vertex\"\n        )\n        \
          float[] primvars:skel:jointWeights = {} (\n            elementSize = 4\n            interpolation = \"vertex\"\n        )\n        \
-         rel skel:skeleton = </avatar/skeleton>\n    }}\n\n",
+         rel skel:skeleton = </avatar/skeleton>\n{}    }}\n\n",
+        if layer.texture.is_some() { "\"SkelBindingAPI\", \"MaterialBindingAPI\"" } else { "\"SkelBindingAPI\"" },
         facts(layer),
         u8::from(layer.order > 0),
         extent(mesh.positions.iter()),
@@ -30,6 +34,7 @@ pub(super) fn layer(layer: &AvatarLayer, name: &str) -> String {
         colors(layer),
         array(joints),
         array(weights),
+        layer.texture.as_ref().map_or_else(String::new, |_| material::material(layer, name)),
     )
 }
 
@@ -46,8 +51,11 @@ fn facts(layer: &AvatarLayer) -> String {
     )
 }
 
-/// The display colours: one a vertex, or one for the whole layer.
+/// The places in the texture, or the display colours: one a vertex, or one for the whole layer.
 fn colors(layer: &AvatarLayer) -> String {
+    if let Some(texture) = &layer.texture {
+        return material::places(texture);
+    }
     let colors = &layer.mesh.colors;
     if colors.is_empty() {
         return format!("        color3f[] primvars:displayColor = [{}]\n", tuple(NEUTRAL));

@@ -1,7 +1,7 @@
 //! A dressed avatar for tests: a body of the model in a pose like a scan's, trousers and top lifted off it.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use toile_avatar::{Avatar, AvatarLayer};
+use toile_avatar::{Avatar, AvatarLayer, LayerTexture, Picture};
 use toile_character::{BodyModel, Joint, JointNaming, Motion, Pose, SkinWeights};
 
 /// The avatar: 3 layers, one motion of 9 poses called `wave`.
@@ -40,7 +40,7 @@ pub fn dressed() -> Avatar {
 }
 
 fn layer(name: &str, mesh: toile_geometry::Mesh, weights: SkinWeights, order: u32) -> AvatarLayer {
-    AvatarLayer { name: name.into(), mesh, weights, order, garment: None, thickness: None }
+    AvatarLayer { name: name.into(), mesh, weights, order, garment: None, thickness: None, texture: None }
 }
 
 /// Hips that rise, an arm that turns a full circle, a knee bent all the time.
@@ -59,4 +59,55 @@ fn wave() -> Motion {
         })
         .collect();
     Motion { name: "wave".into(), frame_time: 0.1, poses }
+}
+
+/// A PNG of one pixel, as another program (zlib) packs it.
+#[rustfmt::skip]
+#[allow(dead_code)] // not all tests draw
+pub const PIXEL: &[u8] = &[
+    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52,
+    0x00, 0x00, 0x00, 0x01, 0x00, 0x00, 0x00, 0x01, 0x08, 0x02, 0x00, 0x00, 0x00, 0x90, 0x77, 0x53,
+    0xde, 0x00, 0x00, 0x00, 0x0c, 0x49, 0x44, 0x41, 0x54, 0x78, 0x9c, 0x63, 0x38, 0xd1, 0xe0, 0x00,
+    0x00, 0x03, 0x9c, 0x01, 0x89, 0xb6, 0x1a, 0x9b, 0x05, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4e,
+    0x44, 0xae, 0x42, 0x60, 0x82,
+];
+
+/// The same avatar with textures, relief too: seen from the front and, in a chart beside, from the back; the vertices between both stand twice.
+#[allow(dead_code)] // not all tests draw
+pub fn textured() -> Avatar {
+    let mut avatar = dressed();
+    for layer in &mut avatar.layers {
+        let mesh = &layer.mesh;
+        let count = mesh.positions.len() as u32;
+        let is_back = |t: usize| {
+            let [a, b, c] = mesh.corners(t);
+            (b - a).cross(&(c - a)).z < 0.0
+        };
+        let place = |v: u32, is_back: bool| {
+            let p = mesh.positions[v as usize];
+            let across = (p.x + 1.0) / 4.0;
+            [if is_back { 1.0 - across } else { across }, 1.0 - p.y / 2.0]
+        };
+        let mut first: Vec<Option<bool>> = vec![None; mesh.positions.len()];
+        let mut again = std::collections::BTreeMap::new();
+        let (mut source, mut uv): (Vec<u32>, Vec<[f32; 2]>) = ((0..count).collect(), vec![[0.0; 2]; count as usize]);
+        let mut triangles = Vec::new();
+        for (t, corners) in mesh.triangles.iter().enumerate() {
+            let side = is_back(t);
+            triangles.push(corners.map(|v| {
+                if *first[v as usize].get_or_insert(side) == side {
+                    uv[v as usize] = place(v, side);
+                    return v;
+                }
+                *again.entry(v).or_insert_with(|| {
+                    source.push(v);
+                    uv.push(place(v, side));
+                    source.len() as u32 - 1
+                })
+            }));
+        }
+        let picture = || Picture::Png(PIXEL.to_vec());
+        layer.texture = Some(LayerTexture { source, uv, triangles, base_color: picture(), normal: Some(picture()) });
+    }
+    avatar
 }

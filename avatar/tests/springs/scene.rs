@@ -175,6 +175,7 @@ fn dressed(seed: u64, kind: GarmentKind) -> Avatar {
         order,
         garment: None,
         thickness: None,
+        texture: None,
     };
     Avatar {
         name: "tester".into(),

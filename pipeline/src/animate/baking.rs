@@ -9,7 +9,7 @@ use toile_cloth::Fabric;
 use toile_geometry::{bvh::Bvh, intersection::self_crossings};
 
 use super::{
-    caches::{Caches, Written},
+    caches::{Cache, Caches, Written},
     checkpoint::{self, Checkpoints, Key, Left},
     endless::LeadIn,
     inputs::Baking,
@@ -41,7 +41,7 @@ impl Baking<'_> {
         } else {
             checkpoints.clear()?;
             mover.start(&self.avatar.pose0, self.motion, lead_in.as_ref()).map_err(|e| wrong(&e))?;
-            (Caches::begin(self.folder, &self.sizes(), self.motion.poses.len())?, Vec::new())
+            (Caches::begin(self.folder, &self.cached(), self.motion.poses.len())?, Vec::new())
         };
         let mut report = AnimationReport::new(self.motion, self.options, self.garments);
         report.physical_shares = (self.options.blend == Blend::Seed).then(|| outfit.physical_shares());
@@ -88,7 +88,7 @@ impl Baking<'_> {
             Left::Useless(why) => return useless(&why),
             Left::Unfinished(frames, state) => (frames, state),
         };
-        let caches = Caches::go_on(self.folder, &self.sizes(), count, frames.len())?;
+        let caches = Caches::go_on(self.folder, &self.cached(), count, frames.len())?;
         let Some(caches) = caches.filter(|_| frames.len() <= count && mover.restore(&state).is_ok()) else {
             return useless("its caches are not whole");
         };
@@ -124,9 +124,13 @@ impl Baking<'_> {
         Err(PipelineError::refused(self.folder, reason))
     }
 
-    /// Names and numbers of vertices of the layers.
-    fn sizes(&self) -> Vec<(&str, usize)> {
-        self.avatar.layers.iter().map(|l| (l.name.as_str(), l.mesh.positions.len())).collect()
+    /// The layers as their caches have them.
+    fn cached(&self) -> Vec<Cache<'_>> {
+        fn of_layer(l: &AvatarLayer) -> Cache<'_> {
+            let vertices = l.mesh.positions.len();
+            Cache { name: &l.name, vertices, again: l.texture.as_ref().map_or(&[], |t| &t.source[vertices..]) }
+        }
+        self.avatar.layers.iter().map(of_layer).collect()
     }
 
     /// Writes what is made from the caches, and puts all files in their place.
@@ -137,8 +141,7 @@ impl Baking<'_> {
         report: &mut AnimationReport,
         lead_in: Option<&LeadIn>,
     ) -> Result<(), PipelineError> {
-        let points: Vec<usize> = self.sizes().iter().map(|n| n.1).collect();
-        let mut cached = written.open(&points)?;
+        let mut cached = written.open(&self.cached())?;
         if let Some(lead_in) = lead_in {
             report.endless = Some(lead_in.closed(&mut cached, self.motion)?);
         }

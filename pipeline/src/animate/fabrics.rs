@@ -117,7 +117,7 @@ mod tests {
 
     fn layer(name: &str, garment: Option<&str>) -> AvatarLayer {
         let (mesh, weights, garment) = (Mesh::default(), SkinWeights::default(), garment.map(str::to_string));
-        AvatarLayer { name: name.into(), mesh, weights, order: 0, garment, thickness: None }
+        AvatarLayer { name: name.into(), mesh, weights, order: 0, garment, thickness: None, texture: None }
     }
 
     fn of(text: &str) -> Result<Vec<Fabric>, PipelineError> {

@@ -39,7 +39,7 @@ fn dressed(skirt: impl Fn(Point3<f32>) -> Mesh) -> Avatar {
     (0..mesh.positions.len()).for_each(|_| weights.push(&[(Joint::Hips.index() as u8, 1.0)]));
     let layer = |name: &str, order, mesh, weights| {
         let garment = (order > 0).then(|| "skirt".to_string());
-        AvatarLayer { name: name.into(), mesh, weights, order, garment, thickness: None }
+        AvatarLayer { name: name.into(), mesh, weights, order, garment, thickness: None, texture: None }
     };
     let layers = vec![layer("body", 0, body.mesh, body.weights), layer("01-skirt", 1, mesh, weights)];
     let (name, joint_names) = ("anna".into(), JointNaming::Vrm);

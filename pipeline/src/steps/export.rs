@@ -14,7 +14,8 @@ use toile_animation::{
     RetargetReport, Retargeted,
     springs::{self, RestedLayer},
 };
-use toile_avatar::{Avatar, AvatarError, AvatarLayer, VrmMeta, vrm_pose, write_glb, write_vrm};
+use toile_avatar::{Avatar, AvatarError, AvatarLayer, LayerTexture, VrmMeta, vrm_pose, write_glb, write_vrm};
+use toile_capture::files::is_there;
 use toile_character::{JointNaming, SpringBones};
 use toile_garments::{CullSettings, GarmentError, GarmentType, Worn, hidden_triangles};
 use toile_geometry::Mesh;
@@ -25,7 +26,10 @@ use crate::{
     body_file::Body,
     exchange,
     garment::Garment,
-    json, look,
+    json,
+    layer_files::texture_of,
+    levels::{self, Level},
+    look,
     look::Look,
     meshes::{read_mesh, read_skinned},
     motion,
@@ -57,6 +61,9 @@ pub struct Exported {
     pub left_out: BTreeMap<String, LeftOut>,
     /// The spring bones of the VRM file, where something hangs loose and they are wanted.
     pub springs: Option<Hung>,
+    /// The levels of detail that were written.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<Level>,
     /// The layers in the exported motion and in the T-pose of the VRM file.
     pub look: Look,
 }
@@ -93,6 +100,23 @@ impl Export<'_> {
         self.choice.springs.unwrap_or(self.run.settings.avatar.springs) == Springs::On
     }
 
+    /// The layers that have textures, and the files that they are in.
+    fn textured(&self) -> Vec<(&str, PathBuf)> {
+        let folders = &self.run.folders;
+        let of_garments = self.garments.iter().map(|g| (g.name.as_str(), folders.garment_layer(&g.layer)));
+        std::iter::once((BODY, folders.body_layer())).chain(of_garments).filter(|(_, path)| is_there(path)).collect()
+    }
+
+    /// The levels of detail that are asked for, and their files.
+    fn levels(&self, avatar: &Avatar) -> Result<(Vec<Level>, Vec<Vec<u8>>), PipelineError> {
+        let wrong = |e: String| PipelineError::refused(&self.run.folders.glb(), format!("its levels of detail: {e}"));
+        let made = levels::levels(avatar, &self.choice.levels).map_err(wrong)?;
+        let file = |(avatar, level): (Avatar, Level)| {
+            write_glb(&avatar).map(|glb| (level, glb)).map_err(|e| PipelineError::stage(&self.run.folders.glb(), e))
+        };
+        Ok(made.into_iter().map(file).collect::<Result<Vec<_>, _>>()?.into_iter().unzip())
+    }
+
     /// Names of the layers, whether or not something of them is left.
     fn layer_names(&self) -> Vec<&str> {
         std::iter::once(BODY).chain(self.garments.iter().map(|g| g.name.as_str())).collect()
@@ -124,12 +148,14 @@ impl Export<'_> {
         let (folders, body) = (&self.run.folders, &self.body.skinned);
         let (name, weights) = (BODY.to_string(), body.weights.clone());
         let mesh = read_mesh(&self.choice.body_mesh(folders))?;
-        let mut layers = vec![AvatarLayer { name, mesh, weights, order: 0, garment: None, thickness: None }];
+        let texture = texture_at(&folders.body_layer(), &mesh)?;
+        let mut layers = vec![AvatarLayer { name, mesh, weights, order: 0, garment: None, thickness: None, texture }];
         let mut order = 0;
         for garment in self.garments {
             // Over the layer below, whatever is missing between.
             order = garment.number.map_or(0, |n| n + 1 - self.run.first_garment()).max(order + 1);
             let (mesh, weights) = read_skinned(&folders.garment(&garment.layer))?;
+            let texture = texture_at(&folders.garment_layer(&garment.layer), &mesh)?;
             layers.push(AvatarLayer {
                 name: garment.name.clone(),
                 mesh,
@@ -137,6 +163,7 @@ impl Export<'_> {
                 order: order as u32,
                 garment: Some(garment.garment_type.to_string()),
                 thickness: Some(garment.thickness),
+                texture,
             });
         }
         let (skeleton, pose0) = (body.skeleton.clone(), self.body.pose0.clone());
@@ -148,7 +175,7 @@ impl Export<'_> {
 impl Step for Export<'_> {
     type Report = Exported;
     const NAME: &'static str = "export";
-    const VERSION: u32 = 8;
+    const VERSION: u32 = 9;
     const SECONDS: f64 = 1.0;
 
     fn label(&self) -> String {
@@ -163,7 +190,8 @@ impl Step for Export<'_> {
         let folders = &self.run.folders;
         let of_body = [self.choice.body_mesh(folders), folders.body_json(), folders.pose(self.run.first_layer())];
         let of_garments = self.garments.iter().map(|g| folders.garment(&g.layer));
-        Ok(of_body.into_iter().chain(of_garments).chain(self.motion_path()).collect())
+        let textured = self.textured().into_iter().map(|(_, path)| path);
+        Ok(of_body.into_iter().chain(of_garments).chain(textured).chain(self.motion_path()).collect())
     }
 
     fn settings(&self) -> Result<Value, PipelineError> {
@@ -180,7 +208,8 @@ impl Step for Export<'_> {
     fn outputs(&self) -> Vec<PathBuf> {
         let (folders, formats) = (&self.run.folders, &self.choice.formats);
         let mut files = vec![folders.glb(), folders.vrm()];
-        files.extend(exchange::paths(folders, formats, &self.layer_names()));
+        files.extend(exchange::paths(folders, formats, &self.layer_names(), &self.textured()));
+        files.extend(self.choice.levels.iter().map(|&n| folders.root.join(levels::file_name(n))));
         files
     }
 
@@ -189,6 +218,7 @@ impl Step for Export<'_> {
         let wrong = |e: AvatarError| PipelineError::stage(&glb_path, e);
         let mut avatar = self.dressed()?;
         let moved = self.moved(self.motion_path().as_deref(), &avatar)?;
+        let pictures = exchange::pictures(&avatar);
         let left_out = match &self.choice.hidden {
             Some(settings) => {
                 leave_out_hidden(&mut avatar, settings).map_err(|e| PipelineError::stage(&glb_path, e))?
@@ -204,12 +234,15 @@ impl Step for Export<'_> {
         progress(0.75);
         let springs = if self.has_springs() { spring_bones(&avatar).map_err(wrong)? } else { None };
         let vrm = write_vrm(&avatar, &VrmMeta::default(), springs.as_ref()).map_err(wrong)?;
-        let others = exchange::contents(&avatar, &self.choice.formats, &self.layer_names()).map_err(wrong)?;
-        let files = self.outputs().into_iter().zip([glb, vrm].into_iter().chain(others)).collect();
+        let others =
+            exchange::contents(&avatar, &self.choice.formats, &self.layer_names(), &pictures).map_err(wrong)?;
+        progress(0.8);
+        let (levels, simple) = self.levels(&avatar)?;
+        let files = self.outputs().into_iter().zip([glb, vrm].into_iter().chain(others).chain(simple)).collect();
         let of_motion = moved.report.warnings.iter().map(|w| format!("motion {}: {w}", look.motion));
         let warnings = of_motion.chain(look.warnings()).collect();
         let springs = springs.map(|s| Hung::of(&s, &avatar));
-        Ok(Product::new(files, Exported { motion: moved.report, left_out, springs, look }, warnings))
+        Ok(Product::new(files, Exported { motion: moved.report, left_out, springs, levels, look }, warnings))
     }
 }
 
@@ -239,6 +272,11 @@ fn spring_bones(avatar: &Avatar) -> Result<Option<SpringBones>, AvatarError> {
     Ok(springs::spring_bones(&rest.joint_positions(&avatar.skeleton), &layers))
 }
 
+/// The texture of a layer, where it has one.
+fn texture_at(path: &Path, mesh: &Mesh) -> Result<Option<LayerTexture>, PipelineError> {
+    is_there(path).then(|| texture_of(path, mesh)).transpose()
+}
+
 /// Takes triangles that clothes hide off every layer, and vertices that none uses any more; a layer without triangles
 /// goes as a whole.
 fn leave_out_hidden(avatar: &mut Avatar, settings: &CullSettings) -> Result<BTreeMap<String, LeftOut>, GarmentError> {
@@ -249,6 +287,7 @@ fn leave_out_hidden(avatar: &mut Avatar, settings: &CullSettings) -> Result<BTre
         let (mesh, old_of_new) = layer.mesh.filter_triangles(|t| !hidden[t]);
         let (of, kept) = (hidden.len(), mesh.triangles.len());
         left_out.insert(layer.name.clone(), LeftOut { triangles: of - kept, of });
+        layer.texture = layer.texture.as_ref().map(|texture| texture.of_part(|t| !hidden[t], &old_of_new));
         (layer.mesh, layer.weights) = (mesh, layer.weights.gather(&old_of_new));
     }
     avatar.layers.retain(|l| !l.mesh.is_empty());
@@ -276,7 +315,7 @@ mod tests {
         let mesh = Mesh::new(positions, (0..cells * cells).flat_map(cell).collect());
         let mut weights = SkinWeights::default();
         (0..side * side).for_each(|v| weights.push(&[(0, 1.0 + v as f32), (1, 1.0)]));
-        AvatarLayer { name: name.into(), mesh, weights, order, garment: None, thickness: None }
+        AvatarLayer { name: name.into(), mesh, weights, order, garment: None, thickness: None, texture: None }
     }
 
     #[test]

@@ -5,6 +5,7 @@ pub mod export;
 pub mod fit;
 pub mod fuse;
 pub mod generic;
+pub mod layer_texture;
 pub mod page;
 pub mod pose;
 pub mod read_scan;
@@ -40,6 +41,7 @@ pub const STEPS: &[StepFacts] = &[
     facts::<generic::Generic>(),
     facts::<wear::Wear>(),
     facts::<stack::Stack>(),
+    facts::<layer_texture::LayerTexturing>(),
     facts::<export::Export>(),
     facts::<page::Page>(),
 ];

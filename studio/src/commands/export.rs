@@ -10,7 +10,7 @@ use toile_capture::{
 };
 use toile_character::JointNaming;
 use toile_garments::CullSettings;
-use toile_pipeline::{FileFormat, Goal, HiddenChoice, Options};
+use toile_pipeline::{FEWEST_TRIANGLES, FileFormat, Goal, HiddenChoice, Options};
 
 use crate::{
     StudioError,
@@ -37,13 +37,19 @@ swings in other programs; --springs off leaves them out.
 --to writes further files beside them, all in metres with +Y up: avatar.obj with avatar.mtl and avatar-LAYER.ply (the layers in the
 pose of the first scan), avatar.bvh (the motion), avatar.usda (everything). Those that a later --to does not name are removed.
 
-Motion, joint names, springs, formats and hidden triangles that are left out are remembered in SUBJECT/edits/: later runs make the same avatar.
+--lod writes the avatar again with fewer triangles, a file a level: avatar-60k.glb, avatar-20k.glb, avatar-6k.glb, avatar-2k.glb, so that any
+program reads them. Layers keep their skin weights and their places in the texture; what they lost of the relief is in a normal map. A layer
+with fewer triangles is whole.
+
+Motion, joint names, springs, formats, levels and hidden triangles that are left out are remembered in SUBJECT/edits/: later runs make the same avatar.
 
 Examples:
   toile export anna --motion dance.bvh
   toile export anna --glb anna-today.glb
   toile export anna --cull-hidden --cull-margin 50
   toile export anna --to glb,vrm,obj,bvh,usda
+  toile export anna --lod
+  toile export anna --lod 30k,3k
   toile export anna --joint-names mixamo --glb for-unity.glb
   toile export anna/takes/00-body.mcap --mcap plain.mcap";
 
@@ -64,6 +70,10 @@ pub struct Export {
     /// last; glb,vrm the first time)
     #[arg(long, value_enum, value_delimiter = ',', value_name = "FORMAT")]
     to: Option<Vec<Format>>,
+    /// Levels of detail as files of their own, triangles a layer with commas between, or `off`; alone 60k,20k,6k,2k
+    /// (without: as the avatar was made last; off the first time)
+    #[arg(long, value_name = "TRIANGLES", value_delimiter = ',', num_args = 0..=1, default_missing_value = "60k,20k,6k,2k")]
+    lod: Option<Vec<Triangles>>,
     /// Put a copy of the GLB here
     #[arg(long, value_name = "FILE")]
     glb: Option<PathBuf>,
@@ -83,7 +93,7 @@ pub struct Export {
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Convert a recording: depth as plain 16-bit images (16UC1), which other viewers display
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "joint_names", "glb", "vrm", "cull_hidden", "springs", "to"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["motion", "joint_names", "glb", "vrm", "cull_hidden", "springs", "to", "lod"])]
     mcap: Option<PathBuf>,
 }
 
@@ -102,6 +112,25 @@ impl From<Names> for JointNaming {
             Names::Hanim => Self::HAnim,
             Names::Mixamo => Self::Mixamo,
         }
+    }
+}
+
+/// How many triangles a level of detail has on the command line: `20k`, `1500`, or `off`.
+#[derive(Debug, Clone, Copy)]
+struct Triangles(Option<usize>);
+
+impl std::str::FromStr for Triangles {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "off" {
+            return Ok(Self(None));
+        }
+        let (digits, unit) = text.strip_suffix('k').map_or((text, 1), |digits| (digits, 1000));
+        let count = digits.parse::<usize>().ok().and_then(|n| n.checked_mul(unit)).filter(|n| *n >= FEWEST_TRIANGLES);
+        let wrong =
+            || format!("a level has {FEWEST_TRIANGLES} triangles or more, such as 20k or 1500; `off` for no levels");
+        count.map(|n| Self(Some(n))).ok_or_else(wrong)
     }
 }
 
@@ -160,6 +189,7 @@ impl Export {
             joint_names: self.joint_names.map(Into::into),
             hidden: self.hidden()?,
             springs: self.springs.map(Into::into),
+            levels: self.lod.as_ref().map(|lod| lod.iter().filter_map(|n| n.0).collect()),
             formats: self.to.as_ref().map(|to| to.iter().copied().map(Into::into).collect()),
             settings: self.settings.clone(),
             ..Options::default()
