@@ -113,9 +113,28 @@ fn frame_of(inverse: &[[f32; 4]; 4]) -> Option<Isometry3<f64>> {
     Some(Isometry3::from_parts(Translation3::new(matrix[(0, 3)], matrix[(1, 3)], matrix[(2, 3)]), rotation))
 }
 
+/// Copies of vertices that a texture's seams need become the vertex that they are copies of: the first at that place.
+fn without_copies(mesh: Mesh, weights: SkinWeights) -> (Mesh, SkinWeights) {
+    let mut first = BTreeMap::new();
+    let mut kept: Vec<u32> = Vec::new();
+    let new_of_old: Vec<u32> = (0..)
+        .zip(&mesh.positions)
+        .map(|(v, p)| {
+            *first.entry([p.x.to_bits(), p.y.to_bits(), p.z.to_bits()]).or_insert_with(|| {
+                kept.push(v);
+                kept.len() as u32 - 1
+            })
+        })
+        .collect();
+    let triangles = mesh.triangles.iter().map(|t| t.map(|v| new_of_old[v as usize])).collect();
+    let positions = kept.iter().map(|&v| mesh.positions[v as usize]).collect();
+    (Mesh::new(positions, triangles), weights.gather(&kept))
+}
+
 /// All primitives of a mesh as one; `None` where they are not skinned triangles.
 fn layer(mesh: &gltf::Mesh, joints: &[Option<Joint>], buffers: &[gltf::buffer::Data]) -> Option<FileLayer> {
     let (mut all, mut weights) = (Mesh::default(), SkinWeights::default());
+    let mut is_textured = false;
     for primitive in mesh.primitives().filter(|p| p.mode() == gltf::mesh::Mode::Triangles) {
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|data| data.0.as_slice()));
         let start = all.positions.len() as u32;
@@ -126,6 +145,7 @@ fn layer(mesh: &gltf::Mesh, joints: &[Option<Joint>], buffers: &[gltf::buffer::D
             None => (0..count).collect(),
         };
         all.triangles.extend(corners.chunks_exact(3).map(|c| [c[0] + start, c[1] + start, c[2] + start]));
+        is_textured |= reader.read_tex_coords(0).is_some();
         let influences = reader.read_joints(0)?.into_u16().zip(reader.read_weights(0)?.into_f32());
         for (own, shares) in influences {
             let of = |(k, w): (u16, f32)| Some((joints.get(usize::from(k)).copied()??.index() as u8, w));
@@ -137,7 +157,11 @@ fn layer(mesh: &gltf::Mesh, joints: &[Option<Joint>], buffers: &[gltf::buffer::D
         }
     }
     let is_whole = all.validate().is_ok() && weights.len() == all.positions.len() && !all.is_empty();
-    is_whole.then_some(FileLayer { mesh: all, weights, garment: None })
+    if !is_whole {
+        return None;
+    }
+    let (mesh, weights) = if is_textured { without_copies(all, weights) } else { (all, weights) };
+    Some(FileLayer { mesh, weights, garment: None })
 }
 
 fn extra(node: &gltf::Node, key: &str) -> Option<String> {
@@ -166,6 +190,7 @@ mod tests {
             order: 1,
             garment: Some("jacket".into()),
             thickness: None,
+            texture: None,
         };
         let avatar = Avatar {
             name: "anna".into(),

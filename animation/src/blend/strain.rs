@@ -110,7 +110,7 @@ impl Element {
         let [u, v] = [deformation.column(0), deformation.column(1)];
         let (p, q, r) = (u.dot(&u), v.dot(&v), u.dot(&v));
         let (middle, half) = (0.5 * (p + q), 0.5 * (p - q));
-        let largest = middle + half.hypot(r);
+        let largest = middle + (half * half + r * r).sqrt();
         if largest <= limit * limit {
             return None;
         }

@@ -26,6 +26,8 @@ struct Garment {
     over: Vec<Over>,
     through: Vec<Through>,
     lifts: Lifts,
+    /// True for the vertices that stand over a layer in this frame: those below it keep their order with it.
+    stand: Vec<bool>,
 }
 
 impl Order {
@@ -41,7 +43,8 @@ impl Order {
             let through: Vec<Through> =
                 (0..k).map(|j| Through::new(below(j), &normals[j], (j + 1..=k).map(below))).collect();
             let most = through.iter().map(Through::count).fold(edges.len(), usize::max);
-            Garment { lifts: Lifts::new(layers[k].positions.len(), most), edges, over, through }
+            let n = layers[k].positions.len();
+            Garment { lifts: Lifts::new(n, most), stand: vec![false; n], edges, over, through }
         };
         Self { garments: (1..layers.len()).map(garment).collect(), surfaces }
     }
@@ -49,11 +52,12 @@ impl Order {
     /// Lifts the vertices of garment `k` of `layers` (from 1) over all layers below, which are in order.
     pub fn keep(&mut self, layers: &mut [Vec<Point3<f32>>], k: usize) {
         let Self { surfaces, garments } = self;
-        let Garment { edges, over, through, lifts } = &mut garments[k - 1];
+        let Garment { edges, over, through, lifts, stand } = &mut garments[k - 1];
         let (below, rest) = layers.split_at_mut(k);
         let points = &mut rest[0];
-        for (j, over) in over.iter_mut().enumerate() {
-            over.lift_points(points, &surfaces[j], &below[j]);
+        stand.fill(false);
+        for (j, over) in over.iter_mut().enumerate().rev() {
+            over.lift_points((points, stand), &surfaces[j], &below[j]);
         }
         for (j, over) in over.iter().enumerate() {
             over.lift_edges(points, edges, (&surfaces[j], &below[j]), lifts);

@@ -22,6 +22,8 @@ use crate::blend::anchors::NEAR;
 const GAP: f32 = 0.0012;
 /// Vertices look for lower layers within this distance in the outfit's first pose, metres.
 const REACH: f32 = 0.10;
+/// Beside a rim of a lower layer, vertices up to this far from it can come over it, metres: layers slide on each other by less.
+const BESIDE: f32 = 0.03;
 /// Cosine between the normals of a vertex and of what it stands over: what faces elsewhere is the far side of a fold.
 const FACING: f32 = 0.5;
 /// Edges with both ends higher than this, metres, have nothing to do with ridges below: half the edge of a triangle of a scan (5 mm) over
@@ -60,7 +62,9 @@ impl Over {
             match surface.foot(&lower.positions, p, &mut seed) {
                 Some(foot) if foot.height > 0.0 && faces(&foot.normal) => (seed, foot.height.min(GAP)),
                 // Beside a rim, it may come over the lower layer later.
-                None if over_plane(lower, &hit, p).is_some_and(|n| faces(&n)) => (hit.triangle, GAP),
+                None if hit.distance < BESIDE && over_plane(lower, &hit, p).is_some_and(|n| faces(&n)) => {
+                    (hit.triangle, GAP)
+                }
                 _ => (NONE, 0.0),
             }
         };
@@ -69,15 +73,26 @@ impl Over {
         Self { seeds: homes.clone(), heights: vec![f32::INFINITY; homes.len()], homes, gaps }
     }
 
-    /// Lifts each of the upper layer's `points` that is lower over the `surface`, whose vertices are at `places`, than it must be.
-    pub fn lift_points(&mut self, points: &mut [Point3<f32>], surface: &Surface, places: &[Point3<f32>]) {
+    /// Lifts each of the upper layer's `points` that is lower over the `surface`, whose vertices are at `places`, than it must be. Those that
+    /// `stand` over a layer between are left, and those that stand over this one are marked.
+    pub fn lift_points(
+        &mut self,
+        (points, stand): (&mut [Point3<f32>], &mut [bool]),
+        surface: &Surface,
+        places: &[Point3<f32>],
+    ) {
         let Self { seeds, homes, gaps, heights } = self;
         let feet = seeds.par_iter_mut().zip(homes).zip(gaps).zip(heights);
-        points.par_iter_mut().zip(feet).with_min_len(CHUNK).for_each(|(p, (((seed, home), gap), height))| {
+        let points = points.par_iter_mut().zip(stand).zip(feet).with_min_len(CHUNK);
+        points.for_each(|((p, stands), (((seed, home), gap), height))| {
             *height = f32::INFINITY;
+            if *stands {
+                return;
+            }
             if let Some(foot) = walk(surface, places, p, seed, *home) {
                 *p += foot.normal * (*gap - foot.height).max(0.0);
                 *height = foot.height.max(*gap);
+                *stands = true;
             }
         });
     }
@@ -86,7 +101,7 @@ impl Over {
     pub fn lift_edges(
         &self,
         points: &mut [Point3<f32>],
-        edges: &[[u32; 2]],
+        edges: &mut [[u32; 2]],
         (surface, places): (&Surface, &[Point3<f32>]),
         lifts: &mut Lifts,
     ) {
@@ -100,11 +115,8 @@ impl Over {
             let is_through = foot.height < 0.5 * GAP && foot.height > -FARTHEST;
             is_through.then(|| foot.normal * (GAP - foot.height))
         };
-        let lift = |(found, ends): (&mut Vector3<f32>, &[u32; 2])| {
-            *found = by(ends.map(|v| v as usize)).unwrap_or_else(Vector3::zeros);
-        };
-        lifts.found[..edges.len()].par_iter_mut().zip(edges).with_min_len(CHUNK).for_each(lift);
-        lifts.apply(edges, points);
+        lifts.find(edges, |ends| by(ends.map(|v| v as usize)).unwrap_or_else(Vector3::zeros));
+        lifts.apply(edges, |ends| *ends, points);
     }
 }
 

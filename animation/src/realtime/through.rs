@@ -19,14 +19,9 @@ const GAP: f32 = 0.0003;
 /// What comes through farther than this has another place to be, metres: a vertex amid a triangle of 5 mm cannot stand higher over its plane
 /// without having neighbours that do.
 const FARTHEST: f32 = 0.006;
-/// Vertices in a parallel chunk.
-const CHUNK: usize = 512;
-
 /// The vertices of a lower layer that stand under an upper one.
 pub(super) struct Through {
     under: Vec<Under>,
-    /// The triangle over each in this frame.
-    over: Vec<[u32; 3]>,
 }
 
 /// A layer in the outfit's first pose.
@@ -56,8 +51,7 @@ impl Through {
             let home = home(last, v).filter(|_| between.iter().all(|layer| home(layer, v).is_none()))?;
             Some(Under { vertex: v as u32, seed: home, home })
         };
-        let under: Vec<Under> = (0..lower.positions.len()).into_par_iter().filter_map(stand).collect();
-        Self { over: vec![[0; 3]; under.len()], under }
+        Self { under: (0..lower.positions.len()).into_par_iter().filter_map(stand).collect() }
     }
 
     /// How many vertices stand under the upper layer.
@@ -72,14 +66,9 @@ impl Through {
         (places, lower): (&[Point3<f32>], &Surface),
         lifts: &mut Lifts,
     ) {
-        let Self { under, over } = self;
-        let (count, above) = (under.len(), &*points);
-        let vertices = under.par_iter_mut().zip(&mut *over).zip(&mut lifts.found[..count]);
-        vertices.with_min_len(CHUNK).for_each(|((u, over), by)| {
-            *by = u.lift((surface, above), (lower, places));
-            *over = surface.triangles[u.seed as usize];
-        });
-        lifts.apply(over, points);
+        let above = &*points;
+        lifts.find(&mut self.under, |u| u.lift((surface, above), (lower, places)));
+        lifts.apply(&self.under, |u| surface.triangles[u.seed as usize], points);
     }
 }
 
