@@ -321,3 +321,15 @@ fn a_texture_takes_the_place_of_colours_and_repeats_vertices_behind_the_others()
     plain.layers[0].texture.as_mut().unwrap().triangles.pop();
     assert!(write_glb(&plain).unwrap_err().to_string().contains("triangles of its texture"));
 }
+
+#[test]
+fn vertices_that_a_texture_repeats_are_read_as_one() {
+    let avatar = common::textured();
+    let read = toile_avatar::read_avatar(&write_glb(&avatar).unwrap()).unwrap();
+    for layer in &avatar.layers {
+        let found = &read.layers[&layer.name];
+        assert_eq!(found.mesh.positions, layer.mesh.positions, "{}", layer.name);
+        assert_eq!(found.mesh.triangles, layer.mesh.triangles, "{}", layer.name);
+        assert_eq!(found.weights.len(), layer.weights.len());
+    }
+}
