@@ -114,7 +114,7 @@ fn frame_of(inverse: &[[f32; 4]; 4]) -> Option<Isometry3<f64>> {
 }
 
 /// Copies of vertices that a texture's seams need become the vertex that they are copies of: the first at that place.
-fn without_copies(mesh: Mesh, weights: SkinWeights) -> (Mesh, SkinWeights) {
+fn without_copies(mesh: &Mesh, weights: &SkinWeights) -> (Mesh, SkinWeights) {
     let mut first = BTreeMap::new();
     let mut kept: Vec<u32> = Vec::new();
     let new_of_old: Vec<u32> = (0..)
@@ -160,7 +160,7 @@ fn layer(mesh: &gltf::Mesh, joints: &[Option<Joint>], buffers: &[gltf::buffer::D
     if !is_whole {
         return None;
     }
-    let (mesh, weights) = if is_textured { without_copies(all, weights) } else { (all, weights) };
+    let (mesh, weights) = if is_textured { without_copies(&all, &weights) } else { (all, weights) };
     Some(FileLayer { mesh, weights, garment: None })
 }
 

@@ -1,4 +1,5 @@
 //! Generic garments, and garments on other people, on people that the statistical body generates.
+#![allow(clippy::unwrap_used)] // all of it is test code
 
 use toile_character::{BodyModel, GarmentType, Pose, SkinnedMesh};
 use toile_garments::{

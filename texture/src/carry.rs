@@ -210,7 +210,7 @@ impl Carrier<'_> {
     fn picture(&self, place: [f32; 2]) -> [f32; 3] {
         let size = self.from.size as i64;
         let at = place.map(|c| c * size as f32 - 0.5);
-        let first = at.map(|c| c.floor());
+        let first = at.map(f32::floor);
         let [columns, rows] = std::array::from_fn(|k| spline(at[k] - first[k]));
         let texel = |x: i64, y: i64| {
             let [x, y] = [x, y].map(|c| c.clamp(0, size - 1) as usize);

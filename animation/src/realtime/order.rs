@@ -144,10 +144,10 @@ mod tests {
 
     #[test]
     fn a_hem_that_was_beside_the_lower_layer_comes_over_it() {
-        let (lower, upper) = (sheet(0.0, [10, 20], |_, _| 0.0), sheet(0.0213, [14, 18], |_, _| 0.004));
+        let (lower, upper) = (sheet(0.0, [10, 20], |_, _| 0.0), sheet(0.0213, [11, 18], |_, _| 0.004));
         // The lower layer slides by 45 mm under the upper one, which sinks.
         let (slid, sunk) =
-            (sheet(0.045, [10, 20], |_, _| 0.0), sheet(0.0213, [14, 18], |x, _| 0.002 - 0.2 * (x - 0.0513).max(0.0)));
+            (sheet(0.045, [10, 20], |_, _| 0.0), sheet(0.0213, [11, 18], |x, _| 0.002 - 0.2 * (x - 0.0513).max(0.0)));
         let [before, after] = kept([&lower, &upper], [&slid, &sunk]);
         assert!(before > 20 && after == 0, "{before}, then {after}");
     }

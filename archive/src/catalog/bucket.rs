@@ -21,7 +21,8 @@ impl Catalog {
     /// # Errors
     /// [`ArchiveError`] where the catalogue cannot be written. A subject that cannot be fetched is told as one that cannot be read.
     pub fn sync_bucket(&mut self, bucket: &Bucket, subjects: &[RemoteSubject]) -> Result<Synced, ArchiveError> {
-        let found = subjects.iter().map(|subject| (subject.subject.clone(), stamp(subject))).collect();
+        let found: Vec<(PathBuf, String)> =
+            subjects.iter().map(|subject| (subject.subject.clone(), stamp(subject))).collect();
         let small = state::folder(&self.archive).join("small");
         let read = |name: &Path| {
             let missing = || ArchiveError::refused(name, "is no more in the bucket");
@@ -32,7 +33,7 @@ impl Catalog {
             drop(fs::remove_dir_all(&root));
             facts
         };
-        bucket.side_by_side(|| self.bring(found, read))
+        bucket.side_by_side(|| self.bring(&found, read))
     }
 }
 

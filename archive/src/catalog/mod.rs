@@ -84,17 +84,18 @@ impl Catalog {
     /// [`ArchiveError`] where the archive cannot be listed or the catalogue not be written.
     pub fn sync(&mut self) -> Result<Synced, ArchiveError> {
         let archive = self.archive.clone();
-        let found = subjects(&archive)?.into_par_iter().map(|subject| {
+        let stamped = subjects(&archive)?.into_par_iter().map(|subject| {
             let stamp = stamp(&archive.join(&subject));
             (subject, stamp)
         });
-        self.bring(found.collect(), |subject| Facts::read(&archive.join(subject)))
+        let found: Vec<(PathBuf, String)> = stamped.collect();
+        self.bring(&found, |subject| Facts::read(&archive.join(subject)))
     }
 
     /// Reads the subjects whose stamps are others than those that are known.
     fn bring(
         &mut self,
-        found: Vec<(PathBuf, String)>,
+        found: &[(PathBuf, String)],
         read: impl Fn(&Path) -> Result<Facts, ArchiveError> + Sync,
     ) -> Result<Synced, ArchiveError> {
         let known = self.stamps()?;

@@ -1,6 +1,6 @@
 //! What a subject's results in a bucket were made of.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -90,7 +90,9 @@ pub(super) fn is_result(path: &str) -> bool {
 
 /// True for what nothing is made of: takes that were replaced, and files that are not whole.
 pub(super) fn is_unused(path: &str) -> bool {
-    path.starts_with("takes/rejected/") || path.ends_with(".part") || path.starts_with('.')
+    path.starts_with("takes/rejected/")
+        || Path::new(path).extension().is_some_and(|e| e == "part")
+        || path.starts_with('.')
 }
 
 #[cfg(test)]

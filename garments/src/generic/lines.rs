@@ -50,7 +50,7 @@ impl<'a> Lines<'a> {
             let region = self.model.regions[v];
             let lower = if pattern.leg.is_some() { self.leg(region, p, pattern) } else { self.above_hips(region, p) };
             let upper = if pattern.sleeve.is_some() { self.upper(region, p, pattern) } else { self.waist(region, p) };
-            let front = if pattern.open { self.opening(region, p, &normals[v]) } else { FAR };
+            let front = if pattern.open { opening(region, p, &normals[v]) } else { FAR };
             lower.min(upper).min(front)
         };
         self.model.mean.iter().enumerate().map(value).collect()
@@ -87,11 +87,11 @@ impl<'a> Lines<'a> {
         };
         before(p, ends.map(|j| self.joint(j)), pattern.sleeve.unwrap_or(1.0))
     }
+}
 
-    fn opening(&self, region: Region, p: &Point3<f32>, normal: &Vector3<f32>) -> f32 {
-        let is_front = !is_arm(region) && normal.z > 0.0;
-        if is_front { p.x.abs() - OPENING } else { FAR }
-    }
+fn opening(region: Region, p: &Point3<f32>, normal: &Vector3<f32>) -> f32 {
+    let is_front = !is_arm(region) && normal.z > 0.0;
+    if is_front { p.x.abs() - OPENING } else { FAR }
 }
 
 fn is_arm(region: Region) -> bool {

@@ -31,7 +31,6 @@ pub enum Part {
 
 impl Part {
     /// True for the usual way.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so whether to leave it out")]
     pub fn is_cloth(&self) -> bool {
         *self == Self::Cloth
     }

@@ -64,13 +64,12 @@ impl Step for Generic<'_> {
         let person = Person { body: &self.body.skinned, pose: &self.body.pose0 };
         let found = conform_generic(&scanned, garment.garment_type, person, self.model)
             .map_err(|e| PipelineError::stage(&path, e))?;
-        let (bytes, report, said) = match found {
-            Some(found) => (encode_skinned(&found.mesh, &found.weights), Some(found.report), Vec::new()),
-            None => {
-                let (name, kind) = (&garment.name, garment.garment_type);
-                let said = format!("{name}: there is no generic garment of type {kind}; it stays as it was cut");
-                (fs::read(&path).map_err(|e| PipelineError::io(&path, e))?, None, vec![said])
-            }
+        let (bytes, report, said) = if let Some(found) = found {
+            (encode_skinned(&found.mesh, &found.weights), Some(found.report), Vec::new())
+        } else {
+            let (name, kind) = (&garment.name, garment.garment_type);
+            let said = format!("{name}: there is no generic garment of type {kind}; it stays as it was cut");
+            (fs::read(&path).map_err(|e| PipelineError::io(&path, e))?, None, vec![said])
         };
         let files = self.outputs().into_iter().map(|path| (path, bytes.clone())).collect();
         Ok(Product::new(files, report, said))

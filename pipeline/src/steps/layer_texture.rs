@@ -132,9 +132,10 @@ impl Step for LayerTexturing<'_> {
     fn inputs(&self) -> Result<Vec<PathBuf>, PipelineError> {
         let folders = &self.run.folders;
         let scan = [folders.textured(&self.take), folders.texture_seen(&self.take)];
-        let own = match self.is_body {
-            true => vec![folders.body_mesh()],
-            false => vec![folders.cut(&self.take), folders.garment(&self.take)],
+        let own = if self.is_body {
+            vec![folders.body_mesh()]
+        } else {
+            vec![folders.cut(&self.take), folders.garment(&self.take)]
         };
         Ok(scan.into_iter().chain(own).chain(self.clothes()).collect())
     }

@@ -191,16 +191,12 @@ pub(super) fn calibrate_pairs(
             if *sizes[camera].get_or_insert(size) != size {
                 return Err(StudioError::refused(path, "has another size than the pictures before it"));
             }
-            match board.find(&grey(&picture)) {
-                Some(corners) => views.push(View { camera, moment, corners }),
-                None => {
-                    let what = if matches!(board, BoardChoice::Charuco(_)) {
-                        "two markers of the board are"
-                    } else {
-                        "the whole board is"
-                    };
-                    missed.push(format!("{}: {what} not seen; left out", printable_path(path)));
-                }
+            if let Some(corners) = board.find(&grey(&picture)) {
+                views.push(View { camera, moment, corners });
+            } else {
+                let is_charuco = matches!(board, BoardChoice::Charuco(_));
+                let what = if is_charuco { "two markers of the board are" } else { "the whole board is" };
+                missed.push(format!("{}: {what} not seen; left out", printable_path(path)));
             }
         }
     }

@@ -34,12 +34,12 @@ pub struct ClothOptions {
 
 impl ClothOptions {
     /// Whether generic garments were asked for, where anything was said.
-    pub fn generic(&self) -> Option<bool> {
+    pub fn generic(self) -> Option<bool> {
         self.generic.map(|choice| choice == GenericChoice::On)
     }
 
     /// What is to give way, where anything was said.
-    pub fn part(&self) -> Option<toile_garments::Part> {
+    pub fn part(self) -> Option<toile_garments::Part> {
         self.part.map(|choice| match choice {
             PartChoice::Cloth => toile_garments::Part::Cloth,
             PartChoice::Body => toile_garments::Part::Body,

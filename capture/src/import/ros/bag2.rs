@@ -82,7 +82,7 @@ fn files(path: &Path) -> Result<(Vec<PathBuf>, Vec<String>), CaptureError> {
         }
     }
     if files.is_empty() {
-        let packed = listing.files.iter().find(|name| name.ends_with(".zstd"));
+        let packed = listing.files.iter().find(|name| Path::new(name).extension().is_some_and(|e| e == "zstd"));
         let reason = packed.map_or_else(
             || "has none of the files that its metadata.yaml lists".to_string(),
             |name| {
