@@ -1,8 +1,8 @@
 //! A garment that is kept over one of the layers below it.
 //!
-//! Each vertex knows the triangle of the lower layer that it stood over in the scan. In each frame it walks from there to where it
-//! stands now, which takes no search and depends on no other frame, and is lifted where it is lower than it must be. Then the middles of
-//! its edges: a ridge of the lower layer is sharper than the triangles over it.
+//! Each vertex knows the triangle of the lower layer that it stood over in the last frame, at first in the scan. It walks from there to
+//! where it stands now, which takes no search, and is lifted where it is lower than it must be. Then the middles of the garment's edges: a
+//! ridge of the lower layer is sharper than the triangles over it. A vertex that has lost its way begins where it stood in the scan.
 
 use nalgebra::{Point3, Vector3, center};
 use rayon::prelude::*;
